@@ -1,0 +1,67 @@
+#!/usr/bin/env bash
+# Everything a change must pass: format, lints, tests, documentation, and the GPU tests on each software driver at hand.
+# Runs all steps even after one fails, lists them with their durations, and fails if one did.
+set -euo pipefail
+# shellcheck source=scripts/common.sh
+. "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+# Which driver runs is never left to chance, and never a graphics card. Loaders before 1.3.207 know only the second name.
+use_driver() { export VK_DRIVER_FILES=$1 VK_ICD_FILENAMES=$1; }
+
+lavapipe=$(system_lavapipe) || fail "Mesa's lavapipe is missing: run scripts/setup.sh test"
+use_driver "$lavapipe"
+unset VK_INSTANCE_LAYERS VK_LOADER_LAYERS_ENABLE VK_LOADER_LAYERS_DISABLE
+# Mesa's implicit layer reorders devices.
+export NODEVICE_SELECT=1
+# Variables set outside would win over those of .cargo/config.toml.
+unset VK_LAYER_PATH VK_ADD_LAYER_PATH LP_NATIVE_VECTOR_WIDTH
+
+# Tests that open a Vulkan device run one at a time, or they measure and starve each other.
+gpu_tests=()
+other_tests=()
+for file in tests/*.rs; do
+    [ -f "$file" ] || continue
+    name=$(basename "$file" .rs)
+    case $name in
+        gpu_* | shader_* | capture* | cli* | embed* | host* | golden*) gpu_tests+=(--test "$name") ;;
+        *) other_tests+=(--test "$name") ;;
+    esac
+done
+
+started=$SECONDS
+summary=()
+failed=0
+step() {
+    local name=$1 begin=$SECONDS verdict=ok
+    shift
+    printf '\n==> %s\n' "$name"
+    if ! "$@"; then
+        verdict=FAILED
+        failed=1
+    fi
+    summary+=("$(printf '%-6s %5d s  %s' "$verdict" $((SECONDS - begin)) "$name")")
+    printf '%s\n' "--- ${summary[-1]}"
+}
+gpu_step() {
+    if [ ${#gpu_tests[@]} -eq 0 ]; then return; fi
+    step "GPU tests on $1" cargo test "${gpu_tests[@]}" -- --test-threads=1
+}
+
+step "format" cargo fmt --check
+step "lints" cargo clippy --all-targets -- -D warnings
+step "lints of the library without default features" cargo clippy --no-default-features -- -D warnings
+step "unit and graph tests" cargo test --lib --bins --examples "${other_tests[@]}"
+step "documentation examples" cargo test --doc
+step "documentation" env RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
+
+gpu_step "the system's lavapipe"
+for driver in lavapipe swiftshader; do
+    if [ ! -f ".deps/vulkan/$driver/version" ]; then continue; fi
+    use_driver "$PWD/.deps/vulkan/$driver/icd.json"
+    gpu_step "$driver of $(cat ".deps/vulkan/$driver/version")"
+done
+
+printf '\n'
+printf '%s\n' "${summary[@]}"
+printf '%-6s %5d s  %s\n' "$([ $failed -eq 0 ] && echo ok || echo FAILED)" $((SECONDS - started)) "all"
+exit $failed

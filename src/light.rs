@@ -1,0 +1,872 @@
+//! Physically sized lights: disk, rectangle, sphere, line, sun, and the point they shrink to.
+//!
+//! Lengths are metres, angles radians, positions in the space of the scene that holds the light
+//! (right-handed, +Y up). A light is not geometry: it neither blocks light nor shows in the picture.
+
+use std::f32::consts::PI;
+use std::fmt;
+use std::str::FromStr;
+
+use glam::Vec3;
+
+/// Angular diameter of a sun for which the file states none, in radians (0.53 degrees).
+pub const DEFAULT_SUN_ANGLE: f32 = 0.009_250_245;
+
+/// Largest accepted length of a light, in metres. Its square is still far from the end of `f32`.
+pub const MAX_LIGHT_SIZE: f32 = 1.0e9;
+
+/// Smallest accepted length of a light, in metres. A smaller light is asked for as a point.
+pub const MIN_LIGHT_SIZE: f32 = 1.0e-9;
+
+/// The emitting surface of a light.
+///
+/// Rectangle, disk and line lie in the frame of their [`AreaLight`], centred on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(tag = "shape", rename_all = "lowercase"))]
+pub enum LightShape {
+    /// No extent: a hard shadow.
+    Point,
+    /// A disk in the plane of `axis_x` and `axis_y`; emits to the `direction` side only.
+    Disk {
+        /// Metres.
+        radius: f32,
+    },
+    /// A rectangle, `width` along `axis_x` and `height` along `axis_y`; emits to the `direction`
+    /// side only.
+    Rect {
+        /// Metres along `axis_x`.
+        width: f32,
+        /// Metres along `axis_y`.
+        height: f32,
+    },
+    /// A sphere, seen from outside.
+    Sphere {
+        /// Metres.
+        radius: f32,
+    },
+    /// A segment along `axis_x` that emits all round.
+    Line {
+        /// Metres along `axis_x`.
+        length: f32,
+    },
+    /// A disk at infinite distance whose light travels along `direction`.
+    Sun {
+        /// Radians, 0 (a hard shadow) to below pi.
+        angular_diameter: f32,
+    },
+}
+
+/// The kind of a [`LightShape`], without its size. The names are those of the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum ShapeKind {
+    /// `point`
+    Point,
+    /// `disk`
+    Disk,
+    /// `rect`
+    Rect,
+    /// `sphere`
+    Sphere,
+    /// `line`
+    Line,
+    /// `sun`
+    Sun,
+}
+
+impl ShapeKind {
+    /// Every kind, in the order of the documentation.
+    pub const ALL: [Self; 6] = [
+        Self::Point,
+        Self::Disk,
+        Self::Rect,
+        Self::Sphere,
+        Self::Line,
+        Self::Sun,
+    ];
+
+    /// The name on the command line and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Disk => "disk",
+            Self::Rect => "rect",
+            Self::Sphere => "sphere",
+            Self::Line => "line",
+            Self::Sun => "sun",
+        }
+    }
+}
+
+impl fmt::Display for ShapeKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for ShapeKind {
+    type Err = LightError;
+
+    /// Reads `point`, `disk`, `rect`, `sphere` or `line`: a sun is no shape that a light can be
+    /// given, because it has no position.
+    fn from_str(text: &str) -> Result<Self, LightError> {
+        Self::ALL
+            .into_iter()
+            .find(|kind| *kind != Self::Sun && kind.name() == text)
+            .ok_or_else(|| LightError::UnknownShape { text: text.into() })
+    }
+}
+
+impl LightShape {
+    /// The kind of this shape.
+    pub const fn kind(&self) -> ShapeKind {
+        match self {
+            Self::Point => ShapeKind::Point,
+            Self::Disk { .. } => ShapeKind::Disk,
+            Self::Rect { .. } => ShapeKind::Rect,
+            Self::Sphere { .. } => ShapeKind::Sphere,
+            Self::Line { .. } => ShapeKind::Line,
+            Self::Sun { .. } => ShapeKind::Sun,
+        }
+    }
+
+    /// True for the shapes that emit to one side of their plane only: disk and rectangle.
+    pub const fn is_one_sided(&self) -> bool {
+        matches!(self, Self::Disk { .. } | Self::Rect { .. })
+    }
+
+    /// True for the light without a position.
+    pub const fn is_sun(&self) -> bool {
+        matches!(self, Self::Sun { .. })
+    }
+
+    /// Area seen from the front in square metres: of the disk, the rectangle, the outline of the
+    /// sphere. 0 for shapes without area (point, line) and for a sun, which has no metres.
+    pub fn projected_area(&self) -> f32 {
+        match *self {
+            Self::Disk { radius } | Self::Sphere { radius } => PI * radius * radius,
+            Self::Rect { width, height } => width * height,
+            Self::Point | Self::Line { .. } | Self::Sun { .. } => 0.0,
+        }
+    }
+
+    /// Radius in metres of the smallest ball about the centre that holds the shape; 0 for a point
+    /// and for a sun.
+    pub fn bounding_radius(&self) -> f32 {
+        match *self {
+            Self::Disk { radius } | Self::Sphere { radius } => radius,
+            Self::Rect { width, height } => 0.5 * width.hypot(height),
+            Self::Line { length } => 0.5 * length,
+            Self::Point | Self::Sun { .. } => 0.0,
+        }
+    }
+
+    /// This shape with every length (or a sun's angle) multiplied by `factor`. Not validated.
+    #[must_use]
+    pub fn scaled(&self, factor: f32) -> Self {
+        match *self {
+            Self::Point => Self::Point,
+            Self::Disk { radius } => Self::Disk {
+                radius: radius * factor,
+            },
+            Self::Rect { width, height } => Self::Rect {
+                width: width * factor,
+                height: height * factor,
+            },
+            Self::Sphere { radius } => Self::Sphere {
+                radius: radius * factor,
+            },
+            Self::Line { length } => Self::Line {
+                length: length * factor,
+            },
+            Self::Sun { angular_diameter } => Self::Sun {
+                angular_diameter: angular_diameter * factor,
+            },
+        }
+    }
+
+    /// Checks the sizes: lengths in [[`MIN_LIGHT_SIZE`], [`MAX_LIGHT_SIZE`]], a sun's angle in
+    /// [0, pi).
+    ///
+    /// # Errors
+    /// [`LightError::Size`] or [`LightError::SunAngle`], naming the value.
+    pub fn validate(&self) -> Result<(), LightError> {
+        match *self {
+            Self::Point => Ok(()),
+            Self::Disk { radius } | Self::Sphere { radius } => check_length("radius", radius),
+            Self::Rect { width, height } => {
+                check_length("width", width)?;
+                check_length("height", height)
+            }
+            Self::Line { length } => check_length("length", length),
+            Self::Sun { angular_diameter } => {
+                if (0.0..PI).contains(&angular_diameter) {
+                    Ok(())
+                } else {
+                    Err(LightError::SunAngle {
+                        text: angular_diameter.to_degrees().to_string(),
+                    })
+                }
+            }
+        }
+    }
+}
+
+impl fmt::Display for LightShape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Point => f.write_str("point"),
+            Self::Disk { radius } => write!(f, "disk, radius {radius} m"),
+            Self::Rect { width, height } => write!(f, "rect, {width} x {height} m"),
+            Self::Sphere { radius } => write!(f, "sphere, radius {radius} m"),
+            Self::Line { length } => write!(f, "line, length {length} m"),
+            Self::Sun { angular_diameter } => {
+                write!(f, "sun, {} degrees across", angular_diameter.to_degrees())
+            }
+        }
+    }
+}
+
+fn check_length(what: &'static str, metres: f32) -> Result<(), LightError> {
+    if (MIN_LIGHT_SIZE..=MAX_LIGHT_SIZE).contains(&metres) {
+        Ok(())
+    } else {
+        Err(LightError::Size {
+            what,
+            text: metres.to_string(),
+        })
+    }
+}
+
+/// What [`AreaLight::intensity`] measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
+pub enum IntensityUnit {
+    /// Luminous intensity of the whole light, lm/sr.
+    Candela,
+    /// Illuminance of a surface that faces a sun, lm/m2.
+    Lux,
+    /// Luminance of the emitting surface, cd/m2.
+    Nits,
+}
+
+/// The cone of a spot light. It shapes the shaded picture only and never visibility.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct SpotCone {
+    /// Angle from the axis up to which the light is full, in radians, 0 to `outer`.
+    pub inner: f32,
+    /// Angle from the axis at which the light has faded to nothing, in radians, up to pi / 2.
+    pub outer: f32,
+}
+
+/// A light with its place, its frame and its brightness.
+///
+/// `axis_x`, `axis_y` and `-direction` form a right-handed orthonormal frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AreaLight {
+    /// The emitting surface.
+    pub shape: LightShape,
+    /// Centre in scene space, metres. Without meaning for a sun.
+    pub center: Vec3,
+    /// Unit vector: the width of a rectangle and the course of a line.
+    pub axis_x: Vec3,
+    /// Unit vector: the height of a rectangle.
+    pub axis_y: Vec3,
+    /// Unit vector: where the light emits to; for a sun the way its light travels.
+    pub direction: Vec3,
+    /// Linear RGB, each 0 or more.
+    pub color: Vec3,
+    /// Brightness in `unit`, 0 or more.
+    pub intensity: f32,
+    /// Unit of `intensity`.
+    pub unit: IntensityUnit,
+    /// Distance in metres beyond which the light counts as dark in the shaded picture; `None` for
+    /// no limit. Visibility ignores it.
+    pub range: Option<f32>,
+    /// The cone of a spot light.
+    pub spot: Option<SpotCone>,
+}
+
+impl AreaLight {
+    /// A white light of one candela (one lux for a sun) at `center`, emitting along `direction`.
+    ///
+    /// `axis_x` sets the roll: the part of it across `direction` becomes the light's own `axis_x`.
+    /// A zero or parallel `axis_x` and a zero `direction` (taken as -Z) are replaced by some fixed
+    /// choice, so the frame is orthonormal for any finite input.
+    pub fn new(shape: LightShape, center: Vec3, direction: Vec3, axis_x: Vec3) -> Self {
+        let z = unit_or(-direction, Vec3::Z);
+        let axis_x = unit_or(axis_x, Vec3::ZERO);
+        let across = axis_x - z * axis_x.dot(z);
+        // What is left of a parallel axis is rounding error, not a direction.
+        let x = if across.length() > 1.0e-5 {
+            across.normalize()
+        } else {
+            z.any_orthonormal_vector()
+        };
+        let x = (x - z * x.dot(z)).normalize();
+        Self {
+            shape,
+            center,
+            axis_x: x,
+            axis_y: z.cross(x).normalize(),
+            direction: -z,
+            color: Vec3::ONE,
+            intensity: 1.0,
+            unit: if shape.is_sun() {
+                IntensityUnit::Lux
+            } else {
+                IntensityUnit::Candela
+            },
+            range: None,
+            spot: None,
+        }
+    }
+
+    /// Luminous intensity in candela along the light's axis: `intensity` itself, or luminance
+    /// times the area seen from there. A sun, which has none, answers its `intensity` in lux.
+    pub fn candela(&self) -> f32 {
+        match self.unit {
+            IntensityUnit::Candela | IntensityUnit::Lux => self.intensity,
+            IntensityUnit::Nits => self.intensity * self.shape.projected_area(),
+        }
+    }
+
+    /// Checks shape, frame and brightness, so that no later step can meet a NaN.
+    ///
+    /// # Errors
+    /// A [`LightError`] that names the first bad value.
+    pub fn validate(&self) -> Result<(), LightError> {
+        self.shape.validate()?;
+        let unit = |v: Vec3| (v.length_squared() - 1.0).abs() < 1.0e-3;
+        let frame = [self.axis_x, self.axis_y, -self.direction];
+        if !frame.into_iter().all(unit)
+            || frame[0].cross(frame[1]).dot(frame[2]) < 0.999
+            || !self.center.is_finite()
+        {
+            return Err(LightError::Frame);
+        }
+        if !(self.color.is_finite() && self.color.min_element() >= 0.0) {
+            return Err(LightError::Brightness {
+                what: "color",
+                text: format!("{:?}", self.color.to_array()),
+            });
+        }
+        if !(self.intensity.is_finite() && self.intensity >= 0.0) {
+            return Err(LightError::Brightness {
+                what: "intensity",
+                text: self.intensity.to_string(),
+            });
+        }
+        if let Some(range) = self.range
+            && !(range.is_finite() && range > 0.0)
+        {
+            return Err(LightError::Range {
+                text: range.to_string(),
+            });
+        }
+        if let Some(SpotCone { inner, outer }) = self.spot
+            && !(0.0 <= inner && inner <= outer && outer > 0.0 && outer <= PI / 2.0 + 1.0e-5)
+        {
+            return Err(LightError::Cone {
+                text: format!("{inner} to {outer}"),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// `v` normalised, or `fallback` where `v` has no direction. Scales first: the square of a short or
+/// long vector leaves the range of `f32`.
+fn unit_or(v: Vec3, fallback: Vec3) -> Vec3 {
+    let largest = v.abs().max_element();
+    if largest > 0.0 && largest.is_finite() {
+        (v / largest).normalize()
+    } else {
+        fallback
+    }
+}
+
+/// `--light-size`: `R` for a disk's or sphere's radius, `L` for a line's length, `WxH` for a
+/// rectangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightSize {
+    /// A radius or a length, in metres.
+    Single(f32),
+    /// Width and height, in metres.
+    Rect {
+        /// Metres along the light's `axis_x`.
+        width: f32,
+        /// Metres along the light's `axis_y`.
+        height: f32,
+    },
+}
+
+impl FromStr for LightSize {
+    type Err = LightError;
+
+    fn from_str(text: &str) -> Result<Self, LightError> {
+        let metres = |what, part: &str| {
+            let value = parse_number(part).ok_or_else(|| LightError::Size {
+                what,
+                text: part.into(),
+            })?;
+            check_length(what, value).map(|()| value)
+        };
+        match text.split_once(['x', 'X']) {
+            Some((width, height)) => Ok(Self::Rect {
+                width: metres("width", width)?,
+                height: metres("height", height)?,
+            }),
+            None => Ok(Self::Single(metres("size", text)?)),
+        }
+    }
+}
+
+impl fmt::Display for LightSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Single(size) => write!(f, "{size}"),
+            Self::Rect { width, height } => write!(f, "{width}x{height}"),
+        }
+    }
+}
+
+/// `--light-scale`: a factor on the light's size, above 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightScale(pub f32);
+
+impl FromStr for LightScale {
+    type Err = LightError;
+
+    fn from_str(text: &str) -> Result<Self, LightError> {
+        match parse_number(text) {
+            Some(factor) if (1.0e-6..=1.0e6).contains(&factor) => Ok(Self(factor)),
+            _ => Err(LightError::Scale { text: text.into() }),
+        }
+    }
+}
+
+/// `--sun-angle`: the angular diameter of a sun, held in radians and written in degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SunAngle(pub f32);
+
+impl FromStr for SunAngle {
+    type Err = LightError;
+
+    fn from_str(text: &str) -> Result<Self, LightError> {
+        match text.parse::<f64>() {
+            Ok(degrees) if (0.0..180.0).contains(&degrees) => Ok(Self(degrees.to_radians() as f32)),
+            _ => Err(LightError::SunAngle { text: text.into() }),
+        }
+    }
+}
+
+/// A finite decimal number; `f32::from_str` alone would also take `nan` and `inf`.
+fn parse_number(text: &str) -> Option<f32> {
+    text.parse().ok().filter(|value: &f32| value.is_finite())
+}
+
+/// What the command line says about lights; it wins over the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LightOverrides {
+    /// Replaces the shape of lights that are no sun.
+    pub shape: Option<ShapeKind>,
+    /// Replaces the size of lights that are no sun.
+    pub size: Option<LightSize>,
+    /// Multiplies the size, be it the file's or `size`; for a sun, its angle.
+    pub scale: Option<LightScale>,
+    /// Replaces the angle of suns.
+    pub sun_angle: Option<SunAngle>,
+}
+
+impl LightOverrides {
+    /// True if nothing is overridden.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The part of these overrides that concerns the kind of light that `shape` is: sun or no sun.
+    #[must_use]
+    pub fn for_kind_of(&self, shape: &LightShape) -> Self {
+        if shape.is_sun() {
+            Self {
+                shape: None,
+                size: None,
+                ..*self
+            }
+        } else {
+            Self {
+                sun_angle: None,
+                ..*self
+            }
+        }
+    }
+
+    /// `light` with these overrides. Where the shape changes, brightness is kept by way of its
+    /// candela value, so a light given in nits does not vanish with its area.
+    ///
+    /// # Errors
+    /// An override that does not fit the light: a shape that needs a size and has none, a size of
+    /// the wrong form, a sun's angle for a light that is none, a size out of range.
+    pub fn apply(&self, light: &AreaLight) -> Result<AreaLight, LightError> {
+        let shape = self.apply_to_shape(&light.shape)?;
+        shape.validate()?;
+        let mut changed = AreaLight { shape, ..*light };
+        if shape.kind() != light.shape.kind() && light.unit == IntensityUnit::Nits {
+            changed.intensity = light.candela();
+            changed.unit = IntensityUnit::Candela;
+        }
+        Ok(changed)
+    }
+
+    fn apply_to_shape(&self, from: &LightShape) -> Result<LightShape, LightError> {
+        let factor = self.scale.map_or(1.0, |scale| scale.0);
+        if let LightShape::Sun { angular_diameter } = *from {
+            if self.shape.is_some() || self.size.is_some() {
+                return Err(LightError::SunHasNoShape);
+            }
+            let angular_diameter = self.sun_angle.map_or(angular_diameter, |angle| angle.0);
+            return Ok(LightShape::Sun { angular_diameter }.scaled(factor));
+        }
+        if self.sun_angle.is_some() {
+            return Err(LightError::NotASun { kind: from.kind() });
+        }
+        let kind = self.shape.unwrap_or(from.kind());
+        let shape = match (kind, self.size) {
+            (ShapeKind::Point, None) => LightShape::Point,
+            (ShapeKind::Point, Some(_)) => return Err(LightError::PointHasNoSize),
+            (ShapeKind::Disk, Some(LightSize::Single(radius))) => LightShape::Disk { radius },
+            (ShapeKind::Sphere, Some(LightSize::Single(radius))) => LightShape::Sphere { radius },
+            (ShapeKind::Line, Some(LightSize::Single(length))) => LightShape::Line { length },
+            (ShapeKind::Rect, Some(LightSize::Rect { width, height })) => {
+                LightShape::Rect { width, height }
+            }
+            (ShapeKind::Sun, _) => return Err(LightError::SunHasNoShape),
+            (kind, Some(size)) => {
+                return Err(LightError::SizeForm {
+                    kind,
+                    size,
+                    form: size_form(kind),
+                });
+            }
+            (kind, None) if kind == from.kind() => *from,
+            (kind, None) => match (kind, *from) {
+                (ShapeKind::Disk, LightShape::Sphere { radius }) => LightShape::Disk { radius },
+                (ShapeKind::Sphere, LightShape::Disk { radius }) => LightShape::Sphere { radius },
+                _ => {
+                    return Err(LightError::NoSize {
+                        kind,
+                        from: from.kind(),
+                        form: size_form(kind),
+                    });
+                }
+            },
+        };
+        Ok(shape.scaled(factor))
+    }
+}
+
+/// How `--light-size` is written for a shape.
+fn size_form(kind: ShapeKind) -> &'static str {
+    match kind {
+        ShapeKind::Rect => "WxH (width and height in metres)",
+        ShapeKind::Line => "L (length in metres)",
+        _ => "R (radius in metres)",
+    }
+}
+
+/// A light, or an override of one, that cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LightError {
+    /// A shape that `--light-shape` does not know.
+    #[error("`{text}` is no light shape; use point, disk, rect, sphere or line")]
+    UnknownShape {
+        /// What was given.
+        text: String,
+    },
+    /// A length out of range, or no number.
+    #[error(
+        "light {what} `{text}` is out of range; give metres from 1e-9 to 1e9, or use the shape \
+         `point` for a light without size"
+    )]
+    Size {
+        /// Which length.
+        what: &'static str,
+        /// What was given.
+        text: String,
+    },
+    /// A scale out of range, or no number.
+    #[error("light scale `{text}` is out of range; give a factor from 1e-6 to 1e6")]
+    Scale {
+        /// What was given.
+        text: String,
+    },
+    /// A sun's angle out of range, or no number.
+    #[error("sun angle `{text}` is out of range; give degrees from 0 to below 180")]
+    SunAngle {
+        /// What was given.
+        text: String,
+    },
+    /// A size of the wrong form for the shape.
+    #[error("light size `{size}` does not fit the shape {kind}; it takes {form}")]
+    SizeForm {
+        /// The shape.
+        kind: ShapeKind,
+        /// What was given.
+        size: LightSize,
+        /// What the shape takes.
+        form: &'static str,
+    },
+    /// A shape whose size neither the file nor the command line gives.
+    #[error("a {from} light made a {kind} has no size; add --light-size {form}")]
+    NoSize {
+        /// The shape asked for.
+        kind: ShapeKind,
+        /// The shape in the file.
+        from: ShapeKind,
+        /// What to give.
+        form: &'static str,
+    },
+    /// A size for a point.
+    #[error("a point light has no size; add --light-shape disk, rect, sphere or line")]
+    PointHasNoSize,
+    /// A shape or a size for a sun.
+    #[error("a sun takes neither --light-shape nor --light-size; use --sun-angle")]
+    SunHasNoShape,
+    /// A sun's angle for a light that is none.
+    #[error("--sun-angle needs a directional light, and this one is a {kind}")]
+    NotASun {
+        /// The light's shape.
+        kind: ShapeKind,
+    },
+    /// Colour or intensity negative or not finite.
+    #[error("light {what} {text} is not finite and 0 or more")]
+    Brightness {
+        /// Which value.
+        what: &'static str,
+        /// The value.
+        text: String,
+    },
+    /// A range that is not above 0.
+    #[error("light range {text} is not a finite number above 0; leave it out for no limit")]
+    Range {
+        /// The value.
+        text: String,
+    },
+    /// A spot cone whose angles are out of order.
+    #[error("spot cone {text} is not 0 <= inner <= outer <= pi / 2 radians, with outer above 0")]
+    Cone {
+        /// The value.
+        text: String,
+    },
+    /// A frame that is not orthonormal or a centre that is not finite.
+    #[error(
+        "light frame is not finite, right-handed and orthonormal; build it with AreaLight::new"
+    )]
+    Frame,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn light(shape: LightShape) -> AreaLight {
+        AreaLight::new(shape, Vec3::ZERO, Vec3::NEG_Y, Vec3::X)
+    }
+
+    #[test]
+    fn frame_is_orthonormal_for_any_input() {
+        let odd = [
+            Vec3::ZERO,
+            Vec3::X,
+            Vec3::new(1e-30, 0.0, 0.0),
+            Vec3::new(3e30, -1e30, 2e30),
+            Vec3::new(0.3, -0.2, 0.9),
+            Vec3::NAN,
+        ];
+        for d in odd {
+            for x in odd {
+                let light = AreaLight::new(LightShape::Point, Vec3::ZERO, d, x);
+                assert_eq!(light.validate(), Ok(()), "direction {d}, axis {x}");
+            }
+        }
+        let turned = light(LightShape::Point);
+        assert_eq!(turned.direction, Vec3::NEG_Y);
+        assert_eq!(turned.axis_x, Vec3::X);
+        assert_eq!(turned.axis_y, Vec3::NEG_Z);
+    }
+
+    #[test]
+    fn parsers_take_good_and_name_bad_values() {
+        assert_eq!("0.5".parse(), Ok(LightSize::Single(0.5)));
+        assert_eq!(
+            "2x0.5".parse(),
+            Ok(LightSize::Rect {
+                width: 2.0,
+                height: 0.5
+            })
+        );
+        for bad in [
+            "", "x", "0", "-1", "nan", "inf", "1e10", "1e-10", "2x", "x2", "2x0", "1x2x3", "2x-1",
+            "1m",
+        ] {
+            let error = bad.parse::<LightSize>().expect_err(bad).to_string();
+            assert!(error.contains("out of range"), "{bad}: {error}");
+            assert!(!error.contains('\n'));
+        }
+        assert_eq!("2".parse(), Ok(LightScale(2.0)));
+        for bad in ["0", "-2", "nan", "1e7", "two"] {
+            assert!(bad.parse::<LightScale>().is_err(), "{bad}");
+        }
+        assert_eq!("180".parse::<SunAngle>().ok(), None);
+        assert_eq!("0".parse(), Ok(SunAngle(0.0)));
+        assert_eq!("0.53".parse(), Ok(SunAngle(DEFAULT_SUN_ANGLE)));
+        assert_eq!("disk".parse(), Ok(ShapeKind::Disk));
+        assert!("sun".parse::<ShapeKind>().is_err());
+        assert!("Disk".parse::<ShapeKind>().is_err());
+    }
+
+    #[test]
+    fn overrides_win_over_the_file() -> Result<(), LightError> {
+        let disk = light(LightShape::Disk { radius: 0.5 });
+        let overrides = LightOverrides {
+            size: Some("2".parse()?),
+            scale: Some("1.5".parse()?),
+            ..Default::default()
+        };
+        assert_eq!(
+            overrides.apply(&disk)?.shape,
+            LightShape::Disk { radius: 3.0 }
+        );
+        let as_sphere = LightOverrides {
+            shape: Some(ShapeKind::Sphere),
+            ..Default::default()
+        };
+        assert_eq!(
+            as_sphere.apply(&disk)?.shape,
+            LightShape::Sphere { radius: 0.5 }
+        );
+        let as_rect = LightOverrides {
+            shape: Some(ShapeKind::Rect),
+            ..Default::default()
+        };
+        assert!(matches!(
+            as_rect.apply(&disk),
+            Err(LightError::NoSize { .. })
+        ));
+        let as_rect = LightOverrides {
+            size: Some("2x3".parse()?),
+            ..as_rect
+        };
+        assert_eq!(
+            as_rect.apply(&disk)?.shape,
+            LightShape::Rect {
+                width: 2.0,
+                height: 3.0
+            }
+        );
+        Ok(())
+    }
+
+    #[test]
+    fn overrides_of_the_wrong_kind_are_refused() -> Result<(), LightError> {
+        let sun = light(LightShape::Sun {
+            angular_diameter: DEFAULT_SUN_ANGLE,
+        });
+        let point = light(LightShape::Point);
+        let sun_angle = LightOverrides {
+            sun_angle: Some("5".parse()?),
+            ..Default::default()
+        };
+        assert!(matches!(
+            sun_angle.apply(&point),
+            Err(LightError::NotASun { .. })
+        ));
+        assert_eq!(sun_angle.for_kind_of(&point.shape).apply(&point)?, point);
+        let widened = sun_angle.apply(&sun)?.shape;
+        assert_eq!(
+            widened,
+            LightShape::Sun {
+                angular_diameter: 5f32.to_radians()
+            }
+        );
+        let size = LightOverrides {
+            size: Some("5".parse()?),
+            ..Default::default()
+        };
+        assert_eq!(size.apply(&sun), Err(LightError::SunHasNoShape));
+        assert_eq!(size.apply(&point), Err(LightError::PointHasNoSize));
+        let scale = LightOverrides {
+            scale: Some("1e6".parse()?),
+            ..Default::default()
+        };
+        assert!(matches!(
+            scale.apply(&sun),
+            Err(LightError::SunAngle { .. })
+        ));
+        Ok(())
+    }
+
+    #[test]
+    fn brightness_survives_a_change_of_shape() -> Result<(), LightError> {
+        let mut rect = light(LightShape::Rect {
+            width: 2.0,
+            height: 3.0,
+        });
+        rect.intensity = 100.0;
+        rect.unit = IntensityUnit::Nits;
+        let point = LightOverrides {
+            shape: Some(ShapeKind::Point),
+            ..Default::default()
+        }
+        .apply(&rect)?;
+        assert_eq!(point.candela(), 600.0);
+        assert_eq!(point.unit, IntensityUnit::Candela);
+        Ok(())
+    }
+
+    #[test]
+    fn validate_finds_each_bad_value() {
+        let good = light(LightShape::Disk { radius: 1.0 });
+        let bad = [
+            AreaLight {
+                shape: LightShape::Disk { radius: f32::NAN },
+                ..good
+            },
+            AreaLight {
+                intensity: -1.0,
+                ..good
+            },
+            AreaLight {
+                color: Vec3::new(1.0, f32::INFINITY, 0.0),
+                ..good
+            },
+            AreaLight {
+                range: Some(0.0),
+                ..good
+            },
+            AreaLight {
+                axis_x: Vec3::Y,
+                ..good
+            },
+            AreaLight {
+                center: Vec3::NAN,
+                ..good
+            },
+            AreaLight {
+                spot: Some(SpotCone {
+                    inner: 0.5,
+                    outer: 0.4,
+                }),
+                ..good
+            },
+        ];
+        assert_eq!(good.validate(), Ok(()));
+        for light in bad {
+            assert!(light.validate().is_err(), "{light:?}");
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! What is to be rendered: triangles, materials, cameras and lights in one common space.
+//!
+//! **Scene space** is world space (glTF: metres, right-handed, +Y up) minus
+//! [`Scene::rebase_origin`]. The subtraction happens in `f64`, so a scene far from the world's
+//! origin keeps its small details once it is `f32`.
+//!
+//! A [`Scene`] is plain data: fill it by hand and call [`Scene::finish`], or read it from a file
+//! with `Scene::load` (feature `cli`).
+
+mod bounds;
+mod camera;
+mod error;
+#[cfg(feature = "cli")]
+mod gltf;
+mod select;
+
+use std::path::PathBuf;
+
+use glam::{DVec3, Vec3, Vec4};
+
+use crate::light::AreaLight;
+
+pub use bounds::Aabb;
+pub use camera::{Ray, SceneCamera};
+pub use error::SceneError;
+#[cfg(feature = "cli")]
+pub use gltf::LoadOptions;
+
+/// Largest magnitude of a coordinate in scene space, metres. Products of four such numbers, as in
+/// determinants, stay within `f32`.
+pub const MAX_COORDINATE: f32 = 1.0e9;
+
+/// A scene at one moment: everything is in scene space, nothing is left to be transformed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scene {
+    /// For messages and reports; the file's name without its ending.
+    pub name: String,
+    /// The file it was read from.
+    pub source: Option<PathBuf>,
+    /// The point of the world, in metres, that is the origin of scene space.
+    pub rebase_origin: DVec3,
+    /// Triangle meshes; each [`Primitive::material`] is an index into `materials`.
+    pub primitives: Vec<Primitive>,
+    /// Surfaces.
+    pub materials: Vec<Material>,
+    /// Perspective cameras in document order.
+    pub cameras: Vec<SceneCamera>,
+    /// Lights in document order.
+    pub lights: Vec<SceneLight>,
+    /// The box around all vertices that a triangle uses.
+    pub bounds: Aabb,
+    /// INDEX and name of each orthographic camera, which the scene cannot use but counts.
+    pub(crate) orthographic_cameras: Vec<(usize, String)>,
+}
+
+/// One indexed triangle mesh of one material.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Primitive {
+    /// For messages; made up where the file names nothing.
+    pub name: String,
+    /// The glTF node that placed it; `None` for a mesh that no file holds.
+    pub node: Option<usize>,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// Scene space, metres.
+    pub positions: Vec<Vec3>,
+    /// Unit shading normals, one for each position. The geometric normal is the triangle's own.
+    pub normals: Vec<Vec3>,
+    /// Three for each triangle, each an index into `positions`; counter-clockwise seen from the
+    /// front.
+    pub indices: Vec<u32>,
+}
+
+impl Primitive {
+    /// Number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.indices.len() / 3
+    }
+}
+
+/// How the alpha of a surface counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Ignored: the surface is solid.
+    #[default]
+    Opaque,
+    /// Below `cutoff` the surface has a hole, to light as well.
+    Mask {
+        /// 0 or more.
+        cutoff: f32,
+    },
+    /// See-through in the picture; solid to light.
+    Blend,
+}
+
+/// A surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// For messages; may be empty.
+    pub name: String,
+    /// Linear RGB and alpha, each 0 to 1.
+    pub base_color: Vec4,
+    /// Shaded on both sides. Light is blocked from both sides in any case.
+    pub double_sided: bool,
+    /// How alpha counts.
+    pub alpha_mode: AlphaMode,
+}
+
+impl Default for Material {
+    /// White, opaque, single-sided: glTF's material for primitives that name none.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: Vec4::ONE,
+            double_sided: false,
+            alpha_mode: AlphaMode::Opaque,
+        }
+    }
+}
+
+/// A light and where it came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneLight {
+    /// Name of the node, of its light, or a made-up one.
+    pub name: String,
+    /// Index of the glTF node; `None` for a light that no file holds.
+    pub node: Option<usize>,
+    /// The light in scene space.
+    pub light: AreaLight,
+}
+
+impl Scene {
+    /// Reads a glTF 2.0 file, .glb or .gltf, told apart by content.
+    ///
+    /// Images are not read. External buffers must lie in the folder of the file or below it.
+    ///
+    /// # Errors
+    /// A [`SceneError`] that names the file and the element: a file that is missing, no glTF,
+    /// truncated or invalid, data that is missing or out of range, a scene without triangles.
+    #[cfg(feature = "cli")]
+    pub fn load(
+        path: impl AsRef<std::path::Path>,
+        options: &LoadOptions,
+    ) -> Result<Self, SceneError> {
+        gltf::load(path.as_ref(), options)
+    }
+
+    /// As [`load`](Self::load), from the bytes of a file. `path` need not exist: messages name it,
+    /// and external buffers are looked for in its folder.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    #[cfg(feature = "cli")]
+    pub fn load_slice(
+        path: impl AsRef<std::path::Path>,
+        bytes: &[u8],
+        options: &LoadOptions,
+    ) -> Result<Self, SceneError> {
+        gltf::load_slice(path.as_ref(), bytes, options)
+    }
+
+    /// Number of triangles of all primitives.
+    pub fn triangle_count(&self) -> usize {
+        self.primitives.iter().map(Primitive::triangle_count).sum()
+    }
+
+    /// Checks a scene and computes [`Scene::bounds`]; everything that renders a scene may then rely
+    /// on what the fields promise.
+    ///
+    /// # Errors
+    /// The first thing that is wrong: [`SceneError::Invalid`], [`SceneError::Light`] or
+    /// [`SceneError::NoTriangles`].
+    pub fn finish(&mut self) -> Result<(), SceneError> {
+        let invalid = |element: String, reason: String| SceneError::Invalid {
+            file: self.label(),
+            element,
+            reason,
+        };
+        let mut bounds = Aabb::EMPTY;
+        for (i, primitive) in self.primitives.iter().enumerate() {
+            let element = || format!("primitive {i} `{}`", primitive.name);
+            if primitive.material >= self.materials.len() {
+                let reason = format!("it names material {}, which is missing", primitive.material);
+                return Err(invalid(element(), reason));
+            }
+            let (vertices, normals) = (primitive.positions.len(), primitive.normals.len());
+            if vertices != normals || primitive.indices.len() % 3 != 0 {
+                let reason = format!(
+                    "it has {vertices} positions, {normals} normals and {} indices; give one \
+                     normal a position and three indices a triangle",
+                    primitive.indices.len()
+                );
+                return Err(invalid(element(), reason));
+            }
+            for (vertex, position) in primitive.positions.iter().enumerate() {
+                // Written so that NaN fails.
+                if !(position.abs().max_element() <= MAX_COORDINATE && position.is_finite()) {
+                    let reason = format!(
+                        "vertex {vertex} lies at {position}; coordinates must be finite and at \
+                         most {MAX_COORDINATE:e} m from the scene's origin"
+                    );
+                    return Err(invalid(element(), reason));
+                }
+            }
+            let is_unit = |n: &Vec3| (n.length_squared() - 1.0).abs() < 1.0e-2;
+            if let Some(vertex) = primitive.normals.iter().position(|n| !is_unit(n)) {
+                let reason = format!("the normal of vertex {vertex} is not of length 1");
+                return Err(invalid(element(), reason));
+            }
+            for (at, &index) in primitive.indices.iter().enumerate() {
+                let Some(position) = primitive.positions.get(index as usize) else {
+                    let reason = format!("index {at} names vertex {index} of {vertices}");
+                    return Err(invalid(element(), reason));
+                };
+                bounds.insert(*position);
+            }
+        }
+        for (i, material) in self.materials.iter().enumerate() {
+            let colour = material.base_color;
+            let cutoff = match material.alpha_mode {
+                AlphaMode::Mask { cutoff } => cutoff,
+                AlphaMode::Opaque | AlphaMode::Blend => 0.0,
+            };
+            let unit = |c: f32| (0.0..=1.0).contains(&c);
+            let good = colour.to_array().into_iter().all(unit) && cutoff >= 0.0;
+            if !(good && cutoff.is_finite()) {
+                return Err(invalid(
+                    format!("material {i} `{}`", material.name),
+                    format!("base colour {colour} or alpha cutoff {cutoff} is out of range"),
+                ));
+            }
+        }
+        for (i, camera) in self.cameras.iter().enumerate() {
+            if let Some(fault) = camera.fault() {
+                return Err(invalid(format!("camera {i} `{}`", camera.name), fault));
+            }
+        }
+        for light in &self.lights {
+            light.light.validate().map_err(|source| SceneError::Light {
+                file: self.label(),
+                light: light.name.clone(),
+                source,
+            })?;
+        }
+        if self.triangle_count() == 0 {
+            return Err(SceneError::NoTriangles { file: self.label() });
+        }
+        self.bounds = bounds;
+        Ok(())
+    }
+
+    /// What messages call this scene: its file, else its name.
+    pub fn label(&self) -> String {
+        match &self.source {
+            Some(path) => path.display().to_string(),
+            None if self.name.is_empty() => "scene".into(),
+            None => self.name.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::LightShape;
+
+    fn triangle() -> Scene {
+        Scene {
+            name: "triangle".into(),
+            primitives: vec![Primitive {
+                name: "only".into(),
+                positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::splat(9.0)],
+                normals: vec![Vec3::Z; 4],
+                indices: vec![0, 1, 2],
+                ..Default::default()
+            }],
+            materials: vec![Material::default()],
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn bounds_hold_used_vertices_only() -> Result<(), SceneError> {
+        let mut scene = triangle();
+        scene.finish()?;
+        assert_eq!(scene.bounds.min, Vec3::ZERO);
+        assert_eq!(scene.bounds.max, Vec3::new(1.0, 1.0, 0.0));
+        Ok(())
+    }
+
+    #[test]
+    fn finish_names_what_is_wrong() {
+        type Break = fn(&mut Scene);
+        let broken: [(Break, &str); 9] = [
+            (|s| s.primitives[0].indices[1] = 4, "names vertex 4 of 4"),
+            (|s| s.primitives[0].material = 1, "material 1"),
+            (|s| s.primitives[0].positions[3].y = f32::NAN, "vertex 3"),
+            (|s| s.primitives[0].positions[0].x = 2e9, "vertex 0"),
+            (|s| s.primitives[0].normals[2] = Vec3::ZERO, "vertex 2"),
+            (|s| s.primitives[0].indices.truncate(2), "2 indices"),
+            (|s| s.primitives.clear(), "no triangles"),
+            (|s| s.materials[0].base_color.x = f32::NAN, "material 0"),
+            (
+                |s| {
+                    s.lights.push(SceneLight {
+                        name: "lamp".into(),
+                        node: None,
+                        light: AreaLight::new(
+                            LightShape::Disk { radius: -1.0 },
+                            Vec3::ZERO,
+                            Vec3::Z,
+                            Vec3::X,
+                        ),
+                    });
+                },
+                "light `lamp`",
+            ),
+        ];
+        for (break_it, wanted) in broken {
+            let mut scene = triangle();
+            break_it(&mut scene);
+            let message = match scene.finish() {
+                Ok(()) => panic!("accepted: {wanted}"),
+                Err(error) => error.to_string(),
+            };
+            assert!(message.contains(wanted), "{message}");
+            assert!(message.starts_with("triangle: "), "{message}");
+        }
+    }
+}

@@ -83,8 +83,9 @@ pub fn enumerate() -> Result<Vec<DeviceSummary>, GpuError> {
 impl Gpu {
     /// Loads the Vulkan library and creates an instance and a device.
     ///
-    /// # Errors No loader, no driver, no device of that name, no device that fits, no validation
-    /// layer (when asked for), or a failing call.
+    /// # Errors
+    /// No loader, no driver, no device of that name, no device that fits, no validation layer (when
+    /// asked for), or a failing call.
     pub fn create(options: &GpuOptions) -> Result<Self, GpuError> {
         let own = OwnInstance::create(&options.application_name, options.validation)?;
         let (physical, device, queue_family) =
@@ -234,14 +235,16 @@ impl Gpu {
         self.begin_timestamps()
     }
 
-    /// Frees all that was made here, then, on a device of our own, the device and the instance.
+    /// Frees all that was made here, then, on a device of our own, the device and the instance. What
+    /// the caller created and has not destroyed or retired is reported by the layer as left over.
     /// Returns every validation message that has not been taken, including those about objects that
     /// are still alive.
     ///
     /// On a host's device, the host has to have waited for all our work first.
     ///
-    /// # Errors [`GpuError::Timeout`] when our own device does not come to rest; then everything is
-    /// leaked rather than pulled away from under it.
+    /// # Errors
+    /// [`GpuError::Timeout`] when our own device does not come to rest; then everything is leaked
+    /// rather than pulled away from under it.
     pub fn destroy(mut self) -> Result<Vec<ValidationMessage>, GpuError> {
         self.destroyed = true;
         if self.submitter.is_some()
@@ -422,4 +425,15 @@ fn own_allocator(
         bytes: 0,
         source,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Gpu;
+
+    #[test]
+    fn a_gpu_can_move_to_a_hosts_render_thread() {
+        fn is_send<T: Send>() {}
+        is_send::<Gpu>();
+    }
 }

@@ -217,8 +217,9 @@ impl Gpu {
     /// the shader declares has to be there: some drivers crash on an unwritten one even when it is
     /// not used.
     ///
-    /// # Errors [`GpuError::Descriptor`] names a binding that is missing, unknown, written too
-    /// often or of another kind; [`GpuError::Stale`] for a set of an earlier frame.
+    /// # Errors
+    /// [`GpuError::Descriptor`] names a binding that is missing, unknown, written too often or of
+    /// another kind; [`GpuError::Stale`] for a set of an earlier frame.
     pub fn write_set(&self, set: vk::DescriptorSet, writes: &[SetWrite]) -> Result<(), GpuError> {
         let interface = self.descriptors.slots[self.slot]
             .sets

@@ -485,10 +485,11 @@ impl Gpu {
         unsafe { self.device.destroy_image_view(view, None) };
     }
 
-    /// Creates a texel view of a buffer; `range` in bytes or `vk::WHOLE_SIZE`.
+    /// Creates a texel view of a buffer; `range` in bytes or `vk::WHOLE_SIZE`. The caller stays within
+    /// `max_texel_buffer_elements` of the device's limits, which may be as low as 65536.
     ///
     /// # Errors
-    /// More texels than the device allows, or a failing call.
+    /// A failing call.
     pub fn create_buffer_view(
         &self,
         name: &str,

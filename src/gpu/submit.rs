@@ -94,8 +94,9 @@ impl Gpu {
     /// When `record` fails nothing is submitted. Times are ready for [`Gpu::collect_timings`]
     /// afterwards.
     ///
-    /// # Errors What `record` returns, [`GpuError::HostOwned`] on a host's device,
-    /// [`GpuError::Timeout`], or a failing call.
+    /// # Errors
+    /// What `record` returns, [`GpuError::HostOwned`] on a host's device, [`GpuError::Timeout`], or
+    /// a failing call.
     pub fn run<T, E: From<GpuError>>(
         &mut self,
         record: impl FnOnce(&mut Self, vk::CommandBuffer) -> Result<T, E>,

@@ -142,3 +142,15 @@ pub enum SceneError {
         have: String,
     },
 }
+
+/// At most 60 characters of `text`, none of them a control character.
+pub(super) fn shorten(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let mut short: String = (text.chars().take(LONGEST))
+        .map(|c| if c.is_control() { '?' } else { c })
+        .collect();
+    if text.chars().nth(LONGEST).is_some() {
+        short.push_str("...");
+    }
+    short
+}

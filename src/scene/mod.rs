@@ -19,6 +19,7 @@ use std::path::PathBuf;
 use glam::{DVec3, Vec3, Vec4};
 
 use crate::light::AreaLight;
+use error::shorten;
 
 pub use bounds::Aabb;
 pub use camera::{Ray, SceneCamera};
@@ -49,8 +50,8 @@ pub struct Scene {
     pub lights: Vec<SceneLight>,
     /// The box around all vertices that a triangle uses.
     pub bounds: Aabb,
-    /// INDEX and name of each orthographic camera, which the scene cannot use but counts.
-    pub(crate) orthographic_cameras: Vec<(usize, String)>,
+    /// INDEX and name of each orthographic camera: counted, but of no use here.
+    pub orthographic_cameras: Vec<(usize, String)>,
 }
 
 /// One indexed triangle mesh of one material.
@@ -178,7 +179,7 @@ impl Scene {
         };
         let mut bounds = Aabb::EMPTY;
         for (i, primitive) in self.primitives.iter().enumerate() {
-            let element = || format!("primitive {i} `{}`", primitive.name);
+            let element = || format!("primitive {i} `{}`", shorten(&primitive.name));
             if primitive.material >= self.materials.len() {
                 let reason = format!("it names material {}, which is missing", primitive.material);
                 return Err(invalid(element(), reason));
@@ -225,20 +226,23 @@ impl Scene {
             let good = colour.to_array().into_iter().all(unit) && cutoff >= 0.0;
             if !(good && cutoff.is_finite()) {
                 return Err(invalid(
-                    format!("material {i} `{}`", material.name),
+                    format!("material {i} `{}`", shorten(&material.name)),
                     format!("base colour {colour} or alpha cutoff {cutoff} is out of range"),
                 ));
             }
         }
         for (i, camera) in self.cameras.iter().enumerate() {
             if let Some(fault) = camera.fault() {
-                return Err(invalid(format!("camera {i} `{}`", camera.name), fault));
+                return Err(invalid(
+                    format!("camera {i} `{}`", shorten(&camera.name)),
+                    fault,
+                ));
             }
         }
         for light in &self.lights {
             light.light.validate().map_err(|source| SceneError::Light {
                 file: self.label(),
-                light: light.name.clone(),
+                light: shorten(&light.name),
                 source,
             })?;
         }
@@ -252,7 +256,8 @@ impl Scene {
     /// What messages call this scene: its file, else its name.
     pub fn label(&self) -> String {
         match &self.source {
-            Some(path) => path.display().to_string(),
+            // A message is one line, whatever a file is called.
+            Some(path) => path.display().to_string().replace(char::is_control, "?"),
             None if self.name.is_empty() => "scene".into(),
             None => self.name.clone(),
         }

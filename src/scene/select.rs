@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::error::shorten;
 use super::{Scene, SceneCamera, SceneError, SceneLight};
 use crate::light::LightOverrides;
 
@@ -90,7 +91,7 @@ impl Scene {
                 .apply(&old.light)
                 .map_err(|source| SceneError::Light {
                     file: file.clone(),
-                    light: old.name.clone(),
+                    light: shorten(&old.name),
                     source,
                 })?;
             changed.push(light);
@@ -125,7 +126,7 @@ impl Scene {
     fn orthographic(&self, name: &str) -> SceneError {
         SceneError::Unsupported {
             file: self.label(),
-            element: format!("camera `{name}`"),
+            element: format!("camera `{}`", shorten(name)),
             what: "an orthographic projection".into(),
             remedy: "choose a perspective camera with --camera",
         }
@@ -145,7 +146,7 @@ impl Scene {
                 return Err(SceneError::Ambiguous {
                     file: self.label(),
                     kind,
-                    asked: asked.into(),
+                    asked: shorten(asked),
                     have: list(items.filter(|(_, name)| *name == asked)),
                 });
             }
@@ -159,7 +160,7 @@ impl Scene {
             .ok_or_else(|| SceneError::NotFound {
                 file: self.label(),
                 kind,
-                asked: asked.into(),
+                asked: shorten(asked),
                 have: list(items),
             })
     }
@@ -176,7 +177,7 @@ fn list<'a>(items: impl Iterator<Item = (usize, &'a str)>) -> String {
         }
         let comma = if at == 0 { "" } else { ", " };
         // Writing to a String cannot fail.
-        let _ = write!(text, "{comma}{index} `{name}`");
+        let _ = write!(text, "{comma}{index} `{}`", shorten(name));
     }
     text
 }

@@ -18,6 +18,7 @@ use glam::{DVec3, Vec4};
 use gltf::Document;
 
 use super::camera::SceneCamera;
+use super::error::shorten;
 use super::{AlphaMode, Material, Scene, SceneError};
 use accessor::Accessors;
 use mesh::LocalPrimitive;
@@ -70,18 +71,6 @@ fn element(kind: &str, index: usize, name: Option<&str>) -> String {
         Some(name) if !name.is_empty() => format!("{kind} {index} `{}`", shorten(name)),
         _ => format!("{kind} {index}"),
     }
-}
-
-/// At most 60 characters of `text`, none of them a control character.
-fn shorten(text: &str) -> String {
-    const LONGEST: usize = 60;
-    let mut short: String = (text.chars().take(LONGEST))
-        .map(|c| if c.is_control() { '?' } else { c })
-        .collect();
-    if text.chars().nth(LONGEST).is_some() {
-        short.push_str("...");
-    }
-    short
 }
 
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {

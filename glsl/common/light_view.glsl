@@ -1,0 +1,50 @@
+// A view from the light: its map holds reversed depth, affine in map coordinates for every plane.
+#ifndef ANTUMBRA_COMMON_LIGHT_VIEW_GLSL
+#define ANTUMBRA_COMMON_LIGHT_VIEW_GLSL
+
+// Views of a light that looks all round.
+const uint MAX_LIGHT_VIEWS = 6u;
+
+// q is the offset in metres from the light's centre (of a sun: from the origin of scene space).
+// Perspective: map = ((dot(q, right), dot(q, up)) / dot(q, forward) - corner) * scale,
+//              depth = depth_scale / dot(q, forward).
+// Sun:         map = ((dot(q, right), dot(q, up)) - corner) * scale,
+//              depth = depth_scale * dot(q, forward) + depth_offset.
+struct LightView {
+    vec4 right;   // xyz: unit vector; w: corner.x
+    vec4 up;      // xyz: unit vector; w: corner.y
+    vec4 forward; // xyz: unit vector; w: 1 perspective, 0 sun
+    vec4 scale;   // x, y: scale; z: depth_scale; w: depth_offset
+};
+
+// Map coordinates (0 to 1, y down) in xy, stored depth in z; outside 0 to 1 where q is not in view.
+vec3 light_view_project(LightView view, vec3 q) {
+    vec3 v = vec3(dot(q, view.right.xyz), dot(q, view.up.xyz), dot(q, view.forward.xyz));
+    if (view.forward.w > 0.0) {
+        if (v.z <= 0.0) {
+            return vec3(-1.0);
+        }
+        float w = 1.0 / v.z;
+        return vec3((v.xy * w - vec2(view.right.w, view.up.w)) * view.scale.xy, view.scale.z * w);
+    }
+    return vec3((v.xy - vec2(view.right.w, view.up.w)) * view.scale.xy,
+        view.scale.z * v.z + view.scale.w);
+}
+
+// Depth that the map holds at map coordinates m if the plane through q with unit normal n is there:
+// x; and how much it changes from one side of the map to the other, in both directions: yz.
+// Exact, because depth is affine in map coordinates.
+vec3 light_view_plane(LightView view, vec3 q, vec3 n, vec2 m) {
+    vec2 corner = vec2(view.right.w, view.up.w);
+    vec3 slopes = vec3(dot(n, view.right.xyz), dot(n, view.up.xyz), dot(n, view.forward.xyz));
+    vec2 at = m / view.scale.xy + corner;
+    if (view.forward.w > 0.0) {
+        float k = view.scale.z / dot(n, q);
+        return k * vec3(slopes.x * at.x + slopes.y * at.y + slopes.z, slopes.xy / view.scale.xy);
+    }
+    float k = view.scale.z / slopes.z;
+    float z = k * (dot(n, q) - slopes.x * at.x - slopes.y * at.y) + view.scale.w;
+    return vec3(z, -k * slopes.xy / view.scale.xy);
+}
+
+#endif

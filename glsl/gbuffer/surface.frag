@@ -1,0 +1,76 @@
+#version 460
+// The surface at each pixel centre, from the triangle seen there: where the exact ray meets the
+// triangle's plane, not what rasterisation made of snapped vertices and interpolated depth.
+
+#include "common/camera.glsl"
+#include "common/octahedral.glsl"
+#include "common/triangles.glsl"
+
+layout(set = 0, binding = 0) uniform usampler2D ids;
+layout(set = 0, binding = 1) uniform sampler2D triangles;
+
+layout(push_constant) uniform Push {
+    Camera camera;
+} push;
+
+layout(location = 0) out float view_depth_m;   // 0 where nothing was hit
+layout(location = 1) out uint geometric_normal; // octahedral, turned to the camera
+layout(location = 2) out uint shading_normal;   // octahedral, on the same side
+
+vec4 fetch_triangle_texel(uint texel) {
+    return texelFetch(triangles, triangle_texel_place(texel), 0);
+}
+
+void main() {
+    uvec2 pixel = uvec2(gl_FragCoord.xy);
+    uint id = texelFetch(ids, ivec2(pixel), 0).x;
+    view_depth_m = 0.0;
+    geometric_normal = 0u;
+    shading_normal = 0u;
+    if (id == 0u) {
+        return;
+    }
+    uint triangle = id - 1u;
+    Corner a = fetch_corner(triangle, 0u);
+    Corner b = fetch_corner(triangle, 1u);
+    Corner c = fetch_corner(triangle, 2u);
+    vec3 normal = fetch_geometric_normal(triangle);
+    vec3 ray = pixel_ray(push.camera, pixel);
+    vec3 forward = push.camera.corner_ray.xyz
+        + push.camera.pixel_right.w * push.camera.pixel_right.xyz
+        + push.camera.pixel_down.w * push.camera.pixel_down.xyz;
+
+    // A plane seen edge-on meets the ray anywhere; the triangle's own depth range does not.
+    vec3 to_a = a.position - push.camera.eye.xyz;
+    vec3 depths = vec3(
+        dot(to_a, forward),
+        dot(b.position - push.camera.eye.xyz, forward),
+        dot(c.position - push.camera.eye.xyz, forward));
+    float nearest = min(depths.x, min(depths.y, depths.z));
+    float farthest = max(depths.x, max(depths.y, depths.z));
+    float slope = dot(normal, ray);
+    float depth = slope != 0.0 ? dot(normal, to_a) / slope : farthest;
+    depth = clamp(depth, max(nearest, push.camera.corner_ray.w), max(farthest, push.camera.corner_ray.w));
+
+    // Barycentric coordinates in the plane, from areas along the normal.
+    vec3 p = push.camera.eye.xyz + depth * ray;
+    float weight_b = dot(cross(p - a.position, c.position - a.position), normal);
+    float weight_c = dot(cross(b.position - a.position, p - a.position), normal);
+    float area = dot(cross(b.position - a.position, c.position - a.position), normal);
+    vec2 weights = clamp(vec2(weight_b, weight_c) / max(area, 1.0e-38), 0.0, 1.0);
+    vec3 smooth_normal = (1.0 - weights.x - weights.y) * unit_from_octahedral(unpack_corner_normal(a.normal))
+        + weights.x * unit_from_octahedral(unpack_corner_normal(b.normal))
+        + weights.y * unit_from_octahedral(unpack_corner_normal(c.normal));
+    if (dot(smooth_normal, smooth_normal) < 1.0e-12) {
+        smooth_normal = normal;
+    }
+    if (slope > 0.0) {
+        normal = -normal;
+    }
+    if (dot(smooth_normal, normal) < 0.0) {
+        smooth_normal = -smooth_normal;
+    }
+    view_depth_m = depth;
+    geometric_normal = pack_unit(normal);
+    shading_normal = pack_unit(normalize(smooth_normal));
+}

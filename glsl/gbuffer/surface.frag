@@ -36,9 +36,7 @@ void main() {
     Corner c = fetch_corner(triangle, 2u);
     vec3 normal = fetch_geometric_normal(triangle);
     vec3 ray = pixel_ray(push.camera, pixel);
-    vec3 forward = push.camera.corner_ray.xyz
-        + push.camera.pixel_right.w * push.camera.pixel_right.xyz
-        + push.camera.pixel_down.w * push.camera.pixel_down.xyz;
+    vec3 forward = view_forward(push.camera);
 
     // A plane seen edge-on meets the ray anywhere; the triangle's own depth range does not.
     vec3 to_a = a.position - push.camera.eye.xyz;
@@ -50,7 +48,8 @@ void main() {
     float farthest = max(depths.x, max(depths.y, depths.z));
     float slope = dot(normal, ray);
     float depth = slope != 0.0 ? dot(normal, to_a) / slope : farthest;
-    depth = clamp(depth, max(nearest, push.camera.corner_ray.w), max(farthest, push.camera.corner_ray.w));
+    float near_plane = push.camera.corner_ray.w;
+    depth = clamp(depth, max(nearest, near_plane), max(farthest, near_plane));
 
     // Barycentric coordinates in the plane, from areas along the normal.
     vec3 p = push.camera.eye.xyz + depth * ray;

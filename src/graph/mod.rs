@@ -229,6 +229,11 @@ impl<'f> Graph<'f> {
         PassBuilder { graph: self, pass }
     }
 
+    /// Number of passes declared so far: the place in [`PlanPass::declared`] that the next one gets.
+    pub fn pass_count(&self) -> usize {
+        self.decl.passes.len()
+    }
+
     /// Keeps a transient: its last contents are a result of the frame and stay in memory until the
     /// frame's end.
     pub fn keep<R: ResourceId>(&mut self, id: R) {

@@ -23,6 +23,7 @@ pub struct Bind {
     binding: u32,
     what: Bound,
     part: Option<Part>,
+    array: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -69,11 +70,21 @@ impl Bind {
         }
     }
 
+    /// The same, for an array image (`sampler2DArray`, `image2DArray`) even where the declared part
+    /// has one layer.
+    pub fn array(self) -> Self {
+        Self {
+            array: true,
+            ..self
+        }
+    }
+
     fn new(binding: u32, what: Bound) -> Self {
         Self {
             binding,
             what,
             part: None,
+            array: false,
         }
     }
 }
@@ -294,6 +305,16 @@ impl PassContext<'_> {
         Ok(())
     }
 
+    /// Writes bytes into a buffer, at most 65,536, a multiple of 4.
+    pub fn update_buffer(&mut self, id: BufferId, offset: u64, bytes: &[u8]) -> Result<(), GpuError> {
+        let used = self.find(id.0.resource, None, |a| a == Access::Clear)?;
+        let buffer = self.handles.buffers[used.resource];
+        let device = self.gpu.device();
+        // SAFETY: `cmd` is recording outside rendering; the buffer was declared for the update.
+        unsafe { device.cmd_update_buffer(self.cmd, buffer, offset, bytes) };
+        Ok(())
+    }
+
     /// Clears the declared part of a colour image.
     pub fn clear_image(&mut self, id: ImageId, value: [f32; 4]) -> Result<(), GpuError> {
         let used = *self.find(id.0.resource, None, |a| a == Access::Clear)?;
@@ -356,7 +377,7 @@ impl PassContext<'_> {
             Bound::Sampled(id, sampler) => {
                 let sampled = |a| matches!(a, Access::Sampled(_));
                 let used = *self.find(id.0.resource, bind.part, sampled)?;
-                let view = self.view(&used, bind.part)?;
+                let view = self.view(&used, bind)?;
                 let sampler = self.gpu.sampler(sampler)?;
                 Ok(SetResource::SampledImage {
                     view,
@@ -366,7 +387,7 @@ impl PassContext<'_> {
             }
             Bound::StorageImage(id) => {
                 let used = *self.find(id.0.resource, bind.part, is_storage)?;
-                let view = self.view(&used, bind.part)?;
+                let view = self.view(&used, bind)?;
                 Ok(SetResource::StorageImage { view })
             }
             Bound::Uniform(id) => {
@@ -407,9 +428,12 @@ impl PassContext<'_> {
         }
     }
 
-    fn view(&mut self, used: &PlanUse, part: Option<Part>) -> Result<vk::ImageView, GpuError> {
-        match part.unwrap_or(used.part) {
-            Part::Image(part) => self.view_of(used.resource, part, part.layers > 1),
+    fn view(&mut self, used: &PlanUse, bind: &Bind) -> Result<vk::ImageView, GpuError> {
+        match bind.part.unwrap_or(used.part) {
+            Part::Image(part) => {
+                let array = bind.array || part.layers > 1;
+                self.view_of(used.resource, part, array)
+            }
             Part::Buffer(_) => Err(misuse(self.pass, "views a buffer as an image".to_string())),
         }
     }

@@ -1,0 +1,92 @@
+//! Which triangle each pixel sees, and the surface there.
+
+use super::camera::{PixelCamera, frustum_sees};
+use super::scene_buffers::{SceneBuffers, SceneIds};
+use crate::gpu::{DepthState, GraphicsPipelineDesc, SamplerDesc, spirv};
+use crate::graph::{Access, Bind, Graph, ImageDesc, ImageId, Load, PassKind, Stage};
+use crate::scene::SceneCamera;
+use ash::vk;
+
+/// The surface at each pixel centre.
+#[derive(Clone, Copy, Debug)]
+pub struct GBuffer {
+    /// R32_UINT: one more than the number of the triangle; 0 where nothing was hit.
+    pub ids: ImageId,
+    /// R32F: distance in metres along the view direction; 0 where nothing was hit.
+    pub view_depth: ImageId,
+    /// R32_UINT: geometric normal, octahedral, turned to the camera.
+    pub geometric_normal: ImageId,
+    /// R32_UINT: interpolated normal, octahedral, on the side of the geometric one.
+    pub shading_normal: ImageId,
+}
+
+/// Declares the passes that make the G-buffer.
+pub fn add_gbuffer<'f>(
+    graph: &mut Graph<'f>,
+    scene: &'f SceneBuffers,
+    ids: &SceneIds,
+    camera: &SceneCamera,
+    size: [u32; 2],
+) -> GBuffer {
+    let [width, height] = size;
+    let image = |format| ImageDesc::new(format, width, height);
+    let aspect = width as f32 / height as f32;
+    let matrix = camera.view_projection_reversed(aspect);
+    let pixels = PixelCamera::new(camera, size);
+
+    let triangle_ids = graph.create_image("gbuffer.ids", image(vk::Format::R32_UINT));
+    let depth = graph.create_image("gbuffer.depth", image(vk::Format::D32_SFLOAT));
+    let mut pass = graph.pass("gbuffer.ids", PassKind::Graphics);
+    pass.read(ids.vertices, Access::Vertex);
+    pass.read(ids.indices, Access::Index);
+    let triangle_ids = pass.color(triangle_ids, Load::Clear([0.0; 4]));
+    // Nobody reads the depth afterwards: the surface pass finds it more exactly.
+    let _ = pass.depth(depth, Load::Clear([0.0; 4]));
+    let (vertices, indices) = (ids.vertices, ids.indices);
+    pass.record(move |ctx| {
+        let fragment = Some(&spirv::GBUFFER_IDS_FRAG);
+        let mut pipeline = GraphicsPipelineDesc::new(&spirv::GBUFFER_IDS_VERT, fragment);
+        pipeline.vertex_layout = vec![scene.id_stream()];
+        pipeline.depth = Some(DepthState {
+            compare: vk::CompareOp::GREATER,
+            write: true,
+        });
+        ctx.bind_graphics(pipeline, &[], bytemuck::bytes_of(&matrix))?;
+        ctx.bind_vertices(&[(vertices, 0)])?;
+        ctx.bind_indices(indices, 0)?;
+        for draw in scene.draws() {
+            if frustum_sees(&matrix, &draw.bounds) {
+                ctx.draw_indexed(draw.first_index, draw.index_count, 0);
+            }
+        }
+        Ok(())
+    });
+
+    let view_depth = graph.create_image("gbuffer.view_depth", image(vk::Format::R32_SFLOAT));
+    let geometric = graph.create_image("gbuffer.geometric_normal", image(vk::Format::R32_UINT));
+    let shading = graph.create_image("gbuffer.shading_normal", image(vk::Format::R32_UINT));
+    let mut pass = graph.pass("gbuffer.surface", PassKind::Graphics);
+    pass.read(triangle_ids, Access::Sampled(Stage::Fragment));
+    pass.read(ids.triangles, Access::Sampled(Stage::Fragment));
+    let view_depth = pass.color(view_depth, Load::Discard);
+    let geometric_normal = pass.color(geometric, Load::Discard);
+    let shading_normal = pass.color(shading, Load::Discard);
+    let triangles = ids.triangles;
+    pass.record(move |ctx| {
+        let fragment = Some(&spirv::GBUFFER_SURFACE_FRAG);
+        let pipeline = GraphicsPipelineDesc::new(&spirv::SCREEN_FULLSCREEN_VERT, fragment);
+        let bindings = [
+            Bind::sampled(0, triangle_ids, SamplerDesc::nearest()),
+            Bind::sampled(1, triangles, SamplerDesc::nearest()),
+        ];
+        ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&pixels))?;
+        ctx.draw(0, 3, 1);
+        Ok(())
+    });
+    GBuffer {
+        ids: triangle_ids,
+        view_depth,
+        geometric_normal,
+        shading_normal,
+    }
+}

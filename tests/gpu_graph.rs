@@ -1,0 +1,189 @@
+//! Graphs recorded on a real driver under the validation layer: no message, and the right bytes.
+
+mod support;
+
+#[path = "support/random_graph.rs"]
+mod random_graph;
+#[path = "gpu_graph/imports.rs"]
+mod imports;
+#[path = "gpu_graph/shaders.rs"]
+mod shaders;
+#[path = "gpu_graph/work.rs"]
+mod work;
+
+use antumbra::ash::vk;
+use antumbra::gpu::{Gpu, GpuError};
+use antumbra::graph::simulate::simulate;
+use antumbra::graph::{
+    BufferState, FrameCache, Graph, HistoryStates, ImageDesc, ImageState, PassBuilder, PassKind,
+    PlanResource, ResourceOrigin,
+};
+use imports::Imports;
+use random_graph::{Limits, Recorder, Used, random_graph};
+use support::{assert_no_messages, destroy_clean, gpu, serial};
+use work::World;
+
+/// Numbers of a fixed seed for [`random_graph`].
+fn numbers(seed: u32) -> Vec<u32> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9) | 1;
+    (0..600)
+        .map(|_| {
+            state ^= state << 13;
+            state ^= state >> 17;
+            state ^= state << 5;
+            state
+        })
+        .collect()
+}
+
+/// Gives the passes of a random graph real work, and its imports real images and buffers.
+struct Work<'w, 'g> {
+    world: &'w World,
+    gpu: &'g mut Gpu,
+    imports: &'g mut Imports,
+    history: HistoryStates,
+}
+
+impl<'w> Recorder<'w> for Work<'w, '_> {
+    fn record(&mut self, pass: PassBuilder<'_, 'w>, kind: PassKind, uses: &[Used]) {
+        let (world, uses) = (self.world, uses.to_vec());
+        pass.record(move |context| world.work(context, kind, &uses));
+    }
+
+    fn recordable(&self) -> bool {
+        true
+    }
+
+    fn image(&mut self, t: usize, d: ImageDesc, a: ImageState, b: ImageState) -> vk::Image {
+        self.imports.image(self.gpu, t, d, a, b)
+    }
+
+    fn buffer(&mut self, t: usize, size: u64, a: BufferState, b: BufferState) -> vk::Buffer {
+        self.imports.buffer(self.gpu, t, size, a, b)
+    }
+
+    fn history(&mut self) -> Option<HistoryStates> {
+        Some(self.history.clone())
+    }
+
+    fn finish(&mut self, graph: &mut Graph<'w>, kept: &[Used]) {
+        self.world.judge(graph, kept);
+    }
+}
+
+/// What was done over all graphs.
+#[derive(Debug, Default)]
+struct Sum {
+    frames: usize,
+    passes: usize,
+    barriers: usize,
+    /// Copies and contents that were compared.
+    results: usize,
+    imports: usize,
+    /// Frames that had a last frame's image.
+    continued: usize,
+    /// Frames in which transients shared memory.
+    aliased: usize,
+}
+
+/// Records some frames of one random graph with one cache.
+fn frames(gpu: &mut Gpu, world: &mut World, seed: u32, limits: Limits, count: usize) -> Sum {
+    let (mut cache, mut imports) = (FrameCache::new(), Imports::default());
+    let mut sum = Sum::default();
+    for number in 0..count {
+        world.begin_frame();
+        let history = cache.history();
+        let mut work = Work {
+            world,
+            gpu: &mut *gpu,
+            imports: &mut imports,
+            history,
+        };
+        let graph = random_graph(&numbers(seed), limits, &mut work);
+        let compiled = graph.compile(&*gpu).unwrap();
+        let plan = compiled.plan().clone();
+        let what = format!("graph {seed} frame {number}\n{plan}");
+        assert_eq!(simulate(&plan), [], "{what}");
+        if imports.wants_filling() {
+            gpu.run(|gpu, cmd| {
+                imports.fill(gpu, cmd);
+                Ok::<_, GpuError>(())
+            })
+            .unwrap();
+        }
+        let report = gpu.run(|gpu, cmd| {
+            imports.before(gpu, cmd)?;
+            let report = compiled.record(gpu, &mut cache, cmd)?;
+            imports.after(gpu, cmd)?;
+            world.end_frame(gpu, cmd);
+            Ok::<_, GpuError>(report)
+        });
+        let report = report.unwrap_or_else(|error| panic!("{error}: {what}"));
+        let messages = gpu.take_messages();
+        if !messages.is_empty() {
+            println!("{what}");
+        }
+        assert_no_messages(&messages);
+        assert_eq!(report.passes.len(), plan.passes.len());
+        assert_eq!(report.barriers, plan.barrier_count());
+        assert_eq!(report.transient_bytes, plan.peak_bytes());
+        let previous = |r: &PlanResource| matches!(r.origin, ResourceOrigin::HistoryPrevious { .. });
+        sum.frames += 1;
+        sum.passes += report.passes.len();
+        sum.barriers += report.barriers;
+        sum.results += world.check(&what);
+        sum.continued += usize::from(plan.resources.iter().any(previous));
+        sum.aliased += usize::from(plan.peak_bytes() < plan.unaliased_bytes());
+    }
+    sum.imports = imports.count();
+    cache.destroy(gpu);
+    imports.destroy(gpu);
+    sum
+}
+
+fn record_all(seeds: std::ops::Range<u32>, limits: Limits) -> Sum {
+    let mut gpu = gpu();
+    let mut world = World::new(&mut gpu);
+    let mut sum = Sum::default();
+    for seed in seeds {
+        let of = frames(&mut gpu, &mut world, seed, limits, 3);
+        sum.frames += of.frames;
+        sum.passes += of.passes;
+        sum.barriers += of.barriers;
+        sum.results += of.results;
+        sum.imports += of.imports;
+        sum.continued += of.continued;
+        sum.aliased += of.aliased;
+    }
+    println!("{}: {sum:?}", gpu.info().driver_name);
+    world.destroy(&mut gpu);
+    destroy_clean(gpu);
+    sum
+}
+
+const CLOSED: Limits = Limits {
+    passes: 12,
+    images: 6,
+    buffers: 5,
+    imports: false,
+};
+
+#[test]
+fn random_graphs_are_recorded_without_a_message() {
+    let _one = serial();
+    let sum = record_all(0..40, CLOSED);
+    assert_eq!(sum.frames, 120);
+    assert!(sum.passes > 480 && sum.results > 240 && sum.aliased > 30, "{sum:?}");
+}
+
+#[test]
+fn random_graphs_with_imports_and_history_are_recorded_without_a_message() {
+    let _one = serial();
+    let limits = Limits {
+        imports: true,
+        ..CLOSED
+    };
+    let sum = record_all(1000..1032, limits);
+    assert_eq!(sum.frames, 96);
+    assert!(sum.imports > 30 && sum.continued > 10 && sum.results > 200, "{sum:?}");
+}

@@ -15,11 +15,22 @@ layout(set = 0, binding = 0, std140) uniform HardParams {
 } params;
 layout(set = 0, binding = 1) uniform sampler2D view_depth;
 layout(set = 0, binding = 2) uniform usampler2D geometric_normal;
-layout(set = 0, binding = 3) uniform sampler2DArray map;
-layout(set = 0, binding = 4, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 3) uniform sampler2DArray map_depth;
+layout(set = 0, binding = 4) uniform usampler2DArray map_ids;
+layout(set = 0, binding = 5) uniform sampler2D triangles;
+layout(set = 0, binding = 6) uniform usampler2D ids;
+layout(set = 0, binding = 7, r32f) uniform writeonly image2D visibility;
 
-float fetch_map_depth(ivec2 texel, uint view) {
-    return texelFetch(map, ivec3(texel, view), 0).x;
+vec4 gather_map_depths(vec2 place, uint view) {
+    return textureGather(map_depth, vec3(place, float(view)));
+}
+
+uvec4 gather_map_ids(vec2 place, uint view) {
+    return textureGather(map_ids, vec3(place, float(view)));
+}
+
+vec4 fetch_triangle_texel(uint texel) {
+    return texelFetch(triangles, triangle_texel_place(texel), 0);
 }
 
 float pixel_visibility(uvec2 pixel) {
@@ -29,20 +40,26 @@ float pixel_visibility(uvec2 pixel) {
     }
     vec3 n = unpack_unit(texelFetch(geometric_normal, ivec2(pixel), 0).x);
     vec3 p = params.camera.eye.xyz + depth * pixel_ray(params.camera, pixel);
-    vec3 q = p - params.light.w * params.light.xyz;
+    bool sun = params.light.w == 0.0;
+    vec3 to_light = sun ? params.light.xyz : params.light.xyz - p;
     // On or below the receiver's tangent plane the light's centre is hidden.
-    vec3 to_light = params.light.w > 0.0 ? -q : params.light.xyz;
     if (dot(n, to_light) <= 0.0) {
         return 0.0;
     }
-    for (uint i = 0u; i < params.counts.x; ++i) {
-        vec3 at = light_view_project(params.views[i], q);
-        if (all(greaterThanEqual(at.xy, vec2(0.0))) && all(lessThanEqual(at.xy, vec2(1.0)))) {
-            return hard_visibility(params.views[i], i, q, n, at.xy, float(params.counts.y));
-        }
+    Receiver receiver = Receiver(p, n, to_light, sun, texelFetch(ids, ivec2(pixel), 0).x);
+    vec3 q = sun ? p : -to_light;
+    // Only the search for the view is a loop: what follows it is long.
+    uint found = 0u;
+    vec3 at = light_view_project(params.views[0], q);
+    while (found + 1u < params.counts.x && any(notEqual(at.xy, clamp(at.xy, 0.0, 1.0)))) {
+        found += 1u;
+        at = light_view_project(params.views[found], q);
     }
-    // No view looks there: nothing that could block stands there.
-    return 1.0;
+    if (params.counts.x == 0u || any(notEqual(at.xy, clamp(at.xy, 0.0, 1.0)))) {
+        // No view looks there: nothing that could block stands there.
+        return 1.0;
+    }
+    return hard_visibility(receiver, params.views[found], found, at.xy, float(params.counts.y));
 }
 
 void main() {

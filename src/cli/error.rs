@@ -26,7 +26,7 @@ pub(super) enum CliError {
     #[error(transparent)]
     Gpu(#[from] GpuError),
     #[error(transparent)]
-    Capture(#[from] CaptureError),
+    Capture(Box<CaptureError>),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("cannot write the report: {0}")]
@@ -40,6 +40,12 @@ pub(super) enum CliError {
         "every pixel of the picture is {value:?}; check camera and lights, or pass --allow-uniform"
     )]
     Uniform { value: [f32; 3] },
+}
+
+impl From<CaptureError> for CliError {
+    fn from(error: CaptureError) -> Self {
+        Self::Capture(Box::new(error))
+    }
 }
 
 impl CliError {

@@ -234,8 +234,11 @@ fn touches(step: usize, visits: &mut [Vec<Vec<Visit>>]) -> Vec<Touch> {
     touches
 }
 
-/// Puts transients that begin in this step behind those that had their memory before, and flushes
-/// what those wrote and nobody read, so that it cannot reach memory late.
+/// Puts transients that begin in this step behind those that had their memory before.
+///
+/// What those wrote and nobody read must not reach memory late. An image begins with a transition,
+/// to which all that is available is visible, so such writes are made available. A buffer begins
+/// with a write, so they are also made visible to the first accesses of all its cells.
 fn hand_over(
     schedule: &Schedule<'_>,
     step: usize,
@@ -249,50 +252,53 @@ fn hand_over(
         if tenant.steps.0 != step {
             continue;
         }
+        let firsts = first_scopes(&visits[*resource], step, tenant.image);
         let mut events = Vec::new();
-        let mut flush: Option<Scope> = None;
+        let mut own = Barrier {
+            target: None,
+            src_stages: vk::PipelineStageFlags2::NONE,
+            src_access: vk::AccessFlags2::NONE,
+            dst_stages: vk::PipelineStageFlags2::NONE,
+            dst_access: vk::AccessFlags2::NONE,
+            transition: None,
+        };
+        let mut sources: Vec<(&Cell, Scope)> = Vec::new();
         for (other, owner, other_place) in schedule.placed {
             if owner.steps.1 >= step || !share_memory(place, other_place) {
                 continue;
             }
             for cell in &cells[*other] {
                 events.extend(cell.last_events());
-                let Some(write) = cell.unflushed() else {
+                let (write, hidden): (_, Vec<Scope>) = if tenant.image {
+                    (cell.unflushed(), firsts.clone())
+                } else {
+                    let hidden = firsts.iter().filter(|first| cell.hidden(first).is_some());
+                    (firsts.iter().find_map(|first| cell.hidden(first)), hidden.copied().collect())
+                };
+                let Some(write) = write else {
                     continue;
                 };
-                let done = batch.barriers.iter().find(|b| flushes(b, &write));
+                let done = batch.barriers.iter().find(|b| flushes(b, &write, &hidden));
                 if let Some(done) = done {
                     events.push(Event::by_barrier(done.dst_stages, log.now() + 1));
-                } else {
-                    let sum = flush.get_or_insert(Scope {
-                        stages: vk::PipelineStageFlags2::NONE,
-                        access: vk::AccessFlags2::NONE,
-                    });
-                    sum.stages |= write.stages;
-                    sum.access |= write.access;
+                    continue;
                 }
+                own.src_stages |= write.stages;
+                for first in &hidden {
+                    own.dst_stages |= first.stages;
+                    own.dst_access |= first.access;
+                }
+                sources.push((cell, write));
             }
         }
-        let first = visits[*resource].iter().flatten().find(|v| v.step == step);
-        let first = first.and_then(|visit| visit.need.now.first());
-        if let (Some(flush), Some(first)) = (flush, first) {
-            // One stage suffices: what else the step does chains behind it.
-            let stage = super::access::stage_bits(first.stages).next();
-            let stage = stage.unwrap_or(first.stages);
-            batch.barriers.push(Barrier {
-                target: None,
-                src_stages: flush.stages,
-                src_access: flush.access,
-                dst_stages: stage,
-                // The transition behind this barrier makes an image visible by itself.
-                dst_access: if tenant.image {
-                    vk::AccessFlags2::NONE
-                } else {
-                    first.access
-                },
-                transition: None,
-            });
-            events.push(Event::by_barrier(stage, log.now() + 1));
+        for (cell, write) in &sources {
+            if !cell.is_available(log, own.src_stages) {
+                own.src_access |= write.access;
+            }
+        }
+        if !sources.is_empty() {
+            batch.barriers.push(own);
+            events.push(Event::by_barrier(own.dst_stages, log.now() + 1));
         }
         begins.push((*resource, events));
     }
@@ -309,9 +315,40 @@ fn hand_over(
     batch
 }
 
-/// Whether a global barrier makes this write available.
-fn flushes(barrier: &Barrier, write: &Scope) -> bool {
-    barrier.src_stages.contains(write.stages) && barrier.src_access.contains(write.access)
+/// What the writes of former owners of its memory must be visible to when a transient begins.
+fn first_scopes(visits: &[Vec<Visit>], step: usize, image: bool) -> Vec<Scope> {
+    if image {
+        // One stage suffices: what else the step does chains behind it, and the transition makes
+        // visible by itself.
+        let first = visits.iter().flatten().find(|visit| visit.step == step);
+        let first = first.and_then(|visit| visit.need.now.first());
+        let stage = first.and_then(|first| super::access::stage_bits(first.stages).next());
+        let scope = stage.map(|stages| Scope {
+            stages,
+            access: vk::AccessFlags2::NONE,
+        });
+        return scope.into_iter().collect();
+    }
+    let mut scopes: Vec<Scope> = Vec::new();
+    for first in visits.iter().filter_map(|cell| cell.first()) {
+        for scope in &first.need.now {
+            if !scopes.contains(scope) {
+                scopes.push(*scope);
+            }
+        }
+    }
+    scopes
+}
+
+/// Whether a global barrier makes this write available, and visible to these accesses.
+fn flushes(barrier: &Barrier, write: &Scope, readers: &[Scope]) -> bool {
+    barrier.src_stages.contains(write.stages)
+        && barrier.src_access.contains(write.access)
+        && readers.iter().all(|reader| {
+            reader.access.is_empty()
+                || barrier.dst_stages.contains(reader.stages)
+                    && barrier.dst_access.contains(reader.access)
+        })
 }
 
 /// Whether two placements share a byte.

@@ -431,10 +431,12 @@ impl<'p> Replay<'p> {
                 e.write && missing
             });
         let write_after_read = writes && own_events().any(|e| !e.write && !behind(e));
+        // An image begins with a transition, to which all that is available is visible.
         let hand_over = !self.cells[cell].begun
-            && self
-                .former_events(cell)
-                .any(|e| !behind(e) || (e.write && !e.available_before(stages)));
+            && self.former_events(cell).any(|e| {
+                let hidden = !e.available_before(stages) || (!e.read_since && !seen(e));
+                !behind(e) || (e.write && hidden)
+            });
         for (bad, problem) in [
             (read_after_write, Problem::ReadAfterWrite),
             (write_after_write, Problem::WriteAfterWrite),

@@ -280,6 +280,21 @@ impl Cell {
         })
     }
 
+    /// The last write, if nobody read it and it is not visible to this access.
+    pub fn hidden(&self, scope: &Scope) -> Option<Scope> {
+        let write = self.write.as_ref().filter(|w| !w.declared.is_empty())?;
+        let hidden = self.reads.is_empty() && !write.is_visible(scope);
+        hidden.then_some(Scope {
+            stages: write.event.declared,
+            access: write.declared,
+        })
+    }
+
+    /// Whether the last write is available to a barrier with these source stages.
+    pub fn is_available(&self, log: &Log, src: Stages) -> bool {
+        self.write.as_ref().is_none_or(|write| write.is_available(log, src))
+    }
+
     /// Whether a step may do this behind `batch`, of which `own` covers this cell.
     pub fn allows(&self, need: &Need, log: &Log, batch: &[Barrier], own: Option<&Barrier>) -> bool {
         if self.layout != need.layout {

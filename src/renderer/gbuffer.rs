@@ -1,8 +1,9 @@
 //! Which triangle each pixel sees, and the surface there.
 
-use super::camera::{PixelCamera, frustum_sees};
+use super::camera::PixelCamera;
+use super::draw::draw_ids;
 use super::scene_buffers::{SceneBuffers, SceneIds};
-use crate::gpu::{DepthState, GraphicsPipelineDesc, SamplerDesc, spirv};
+use crate::gpu::{GraphicsPipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, Graph, ImageDesc, ImageId, Load, PassKind, Stage};
 use crate::scene::SceneCamera;
 use ash::vk;
@@ -43,24 +44,7 @@ pub fn add_gbuffer<'f>(
     // Nobody reads the depth afterwards: the surface pass finds it more exactly.
     let _ = pass.depth(depth, Load::Clear([0.0; 4]));
     let (vertices, indices) = (ids.vertices, ids.indices);
-    pass.record(move |ctx| {
-        let fragment = Some(&spirv::GBUFFER_IDS_FRAG);
-        let mut pipeline = GraphicsPipelineDesc::new(&spirv::GBUFFER_IDS_VERT, fragment);
-        pipeline.vertex_layout = vec![scene.id_stream()];
-        pipeline.depth = Some(DepthState {
-            compare: vk::CompareOp::GREATER,
-            write: true,
-        });
-        ctx.bind_graphics(pipeline, &[], bytemuck::bytes_of(&matrix))?;
-        ctx.bind_vertices(&[(vertices, 0)])?;
-        ctx.bind_indices(indices, 0)?;
-        for draw in scene.draws() {
-            if frustum_sees(&matrix, &draw.bounds) {
-                ctx.draw_indexed(draw.first_index, draw.index_count, 0);
-            }
-        }
-        Ok(())
-    });
+    pass.record(move |ctx| draw_ids(ctx, scene, vertices, indices, &matrix));
 
     let view_depth = graph.create_image("gbuffer.view_depth", image(vk::Format::R32_SFLOAT));
     let geometric = graph.create_image("gbuffer.geometric_normal", image(vk::Format::R32_UINT));

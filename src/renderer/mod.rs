@@ -11,14 +11,18 @@
 //! | `shade.light`, for each light | all of the above | radiance, added |
 
 mod camera;
+mod draw;
 mod gbuffer;
 mod scene_buffers;
 mod shade;
+mod visible;
 
 pub use camera::{PixelCamera, frustum_sees};
+pub use draw::draw_ids;
 pub use gbuffer::{GBuffer, add_gbuffer};
 pub use scene_buffers::{Draw, SceneBuffers, SceneIds, UploadError};
 pub use shade::{Ambient, add_shading};
+pub use visible::visible_hulls;
 
 use crate::graph::{Graph, ImageId};
 use crate::light::AreaLight;
@@ -60,6 +64,8 @@ pub fn add_frame<'f>(
     let ids = scene.import(graph);
     let pixels = PixelCamera::new(camera, size);
     let gbuffer = add_gbuffer(graph, scene, &ids, camera, size);
+    let boxes = scene.draws().iter().map(|draw| draw.bounds);
+    let receivers = visible_hulls(camera, size, boxes);
     let mut visibility = Vec::with_capacity(lights.len());
     let mut visibility_passes = Vec::with_capacity(lights.len());
     for light in lights {
@@ -70,9 +76,12 @@ pub fn add_frame<'f>(
                 light_name: light.name.clone(),
                 light: light.light,
                 camera: pixels,
+                ids: gbuffer.ids,
                 view_depth: gbuffer.view_depth,
                 geometric_normal: gbuffer.geometric_normal,
+                receivers: receivers.clone(),
                 scene,
+                triangles: ids.triangles,
                 vertices: ids.vertices,
                 indices: ids.indices,
             },

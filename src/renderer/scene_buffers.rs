@@ -34,7 +34,7 @@ pub enum UploadError {
     Graph(#[from] GraphError),
 }
 
-/// A vertex of `gbuffer/ids.vert` and `hard/map.vert`.
+/// A vertex of `raster/ids.vert`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 struct Vertex {
@@ -249,21 +249,17 @@ impl SceneBuffers {
         self.degenerate
     }
 
-    /// Vertex input of positions alone, at location 0.
-    pub fn position_stream(&self) -> crate::gpu::VertexStream {
-        crate::gpu::VertexStream {
-            stride: size_of::<Vertex>() as u32,
-            attributes: vec![(0, vk::Format::R32G32B32_SFLOAT, 0)],
-            per_instance: false,
-        }
-    }
-
     /// Vertex input of positions at location 0 and triangle numbers at location 1.
     pub fn id_stream(&self) -> crate::gpu::VertexStream {
-        let mut stream = self.position_stream();
         let offset = core::mem::offset_of!(Vertex, triangle) as u32;
-        stream.attributes.push((1, vk::Format::R32_UINT, offset));
-        stream
+        crate::gpu::VertexStream {
+            stride: size_of::<Vertex>() as u32,
+            attributes: vec![
+                (0, vk::Format::R32G32B32_SFLOAT, 0),
+                (1, vk::Format::R32_UINT, offset),
+            ],
+            per_instance: false,
+        }
     }
 
     /// Brings the scene's resources into a graph.

@@ -1,19 +1,20 @@
 //! Technique `hard`: one shadow map from the light's centre.
 //!
 //! Every light shape counts as its centre, so there is no penumbra: the baseline that soft
-//! techniques are compared with, and the limit they reach when a light shrinks. Depths are compared
-//! in the receiver's plane, without a bias (`glsl/hard/hard.glsl`).
+//! techniques are compared with, and the limit they reach when a light shrinks. The map holds
+//! triangles beside depths, and a receiver's ray is tested against those around its texel: edges
+//! lie where they belong and no bias is needed (`glsl/hard/hard.glsl`).
 //!
 //! Passes: parameters, one map pass a view, visibility. A light without casters has none of the
 //! first two, and its visibility is the part above each receiver's tangent plane.
 
 use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
 use super::{ShadowInputs, ShadowMask};
-use crate::gpu::{ComputePipelineDesc, DepthState, GraphicsPipelineDesc, SamplerDesc, spirv};
+use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
     Access, Bind, BufferDesc, Graph, ImageDesc, ImagePart, Load, PassKind, Stage,
 };
-use crate::renderer::{PixelCamera, frustum_sees};
+use crate::renderer::{PixelCamera, draw_ids};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
@@ -38,8 +39,7 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
     let name = &inputs.light_name;
     let light = inputs.light;
     let scene = inputs.scene;
-    let bounds: Vec<_> = scene.draws().iter().map(|draw| draw.bounds).collect();
-    let views = light_views(&light, &bounds);
+    let views = light_views(&light, &inputs.receivers, &scene.bounds());
     let [width, height] = inputs.camera.size();
 
     let mut params = HardParams {
@@ -64,38 +64,27 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
     let buffer = pass.overwrite(buffer, Access::Clear);
     pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
 
-    // An array of at least one layer, so that the shader's binding always has something: a light
-    // without casters has its single texel cleared and never read.
+    // Arrays of at least one layer, so that the shader's bindings always have something: a light
+    // without casters has single texels cleared and never read.
     let layers = views.views.len().max(1) as u32;
     let size = if views.views.is_empty() { 1 } else { MAP_SIZE };
-    let desc = ImageDesc::new(vk::Format::D32_SFLOAT, size, size).layers(layers);
-    let mut map = graph.create_image(format!("hard.map {name}"), desc);
+    let image = |format| ImageDesc::new(format, size, size).layers(layers);
+    let depth = image(vk::Format::D32_SFLOAT);
+    let mut map_depth = graph.create_image(format!("hard.map_depth {name}"), depth);
+    let numbers = image(vk::Format::R32_UINT);
+    let mut map_ids = graph.create_image(format!("hard.map_ids {name}"), numbers);
     for layer in 0..layers {
         let mut pass = graph.pass(format!("hard.map {name}.{layer}"), PassKind::Graphics);
-        map = pass.depth_part(map, ImagePart::layer(layer), Load::Clear([0.0; 4]));
+        let part = ImagePart::layer(layer);
+        map_ids = pass.color_part(map_ids, part, Load::Clear([0.0; 4]));
+        map_depth = pass.depth_part(map_depth, part, Load::Clear([0.0; 4]));
         let Some(matrix) = views.clip_from_scene.get(layer as usize).copied() else {
             continue;
         };
         pass.read(inputs.vertices, Access::Vertex);
         pass.read(inputs.indices, Access::Index);
         let (vertices, indices) = (inputs.vertices, inputs.indices);
-        pass.record(move |ctx| {
-            let mut pipeline = GraphicsPipelineDesc::new(&spirv::HARD_MAP_VERT, None);
-            pipeline.vertex_layout = vec![scene.position_stream()];
-            pipeline.depth = Some(DepthState {
-                compare: vk::CompareOp::GREATER,
-                write: true,
-            });
-            ctx.bind_graphics(pipeline, &[], bytemuck::bytes_of(&matrix))?;
-            ctx.bind_vertices(&[(vertices, 0)])?;
-            ctx.bind_indices(indices, 0)?;
-            for draw in scene.draws() {
-                if frustum_sees(&matrix, &draw.bounds) {
-                    ctx.draw_indexed(draw.first_index, draw.index_count, 0);
-                }
-            }
-            Ok(())
-        });
+        pass.record(move |ctx| draw_ids(ctx, scene, vertices, indices, &matrix));
     }
 
     let desc = ImageDesc::new(vk::Format::R32_SFLOAT, width, height);
@@ -104,9 +93,12 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
     pass.read(buffer, Access::Uniform(Stage::Compute));
     pass.read(inputs.view_depth, Access::Sampled(Stage::Compute));
     pass.read(inputs.geometric_normal, Access::Sampled(Stage::Compute));
-    pass.read(map, Access::Sampled(Stage::Compute));
+    for image in [map_depth, map_ids, inputs.triangles, inputs.ids] {
+        pass.read(image, Access::Sampled(Stage::Compute));
+    }
     let visibility = pass.overwrite(visibility, Access::StorageWrite(Stage::Compute));
     let (view_depth, geometric_normal) = (inputs.view_depth, inputs.geometric_normal);
+    let (triangles, ids) = (inputs.triangles, inputs.ids);
     pass.record(move |ctx| {
         let shader = &spirv::HARD_VISIBILITY_COMP;
         let nearest = SamplerDesc::nearest();
@@ -114,8 +106,11 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
             Bind::uniform(0, buffer),
             Bind::sampled(1, view_depth, nearest),
             Bind::sampled(2, geometric_normal, nearest),
-            Bind::sampled(3, map, nearest).array(),
-            Bind::storage_image(4, visibility),
+            Bind::sampled(3, map_depth, nearest).array(),
+            Bind::sampled(4, map_ids, nearest).array(),
+            Bind::sampled(5, triangles, nearest),
+            Bind::sampled(6, ids, nearest),
+            Bind::storage_image(7, visibility),
         ];
         ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
         ctx.dispatch(shader.groups([width, height, 1]));

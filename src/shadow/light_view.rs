@@ -1,4 +1,4 @@
-//! Views from a light's centre that together see every caster.
+//! Views from a light's centre that together look at every receiver.
 
 use crate::light::AreaLight;
 use crate::scene::Aabb;
@@ -31,33 +31,31 @@ pub struct LightViews {
     pub clip_from_scene: Vec<Mat4>,
 }
 
-/// Widest half angle of a single perspective view. Texels at its rim are 1 / cos^2 = 5.6 times as
+/// Widest half angle of a single perspective view around its receivers. Texels at its rim are 1 / cos^2 = 5.6 times as
 /// wide as those in its middle; beyond that, the faces of a cube are finer.
 const WIDEST: f64 = 65.0 * std::f64::consts::PI / 180.0;
 
-/// Texels kept free around the casters, as a part of the map: rounding must not push the outermost
+/// Texels kept free around the receivers, as a part of the map: rounding must not push the outermost
 /// ones out.
 const MARGIN: f64 = 2.0 / 1024.0;
 
-/// Finds the views of a light that see all of `casters`: one fitted view for a sun, and for a light
-/// whose casters lie within a cone; otherwise those faces of a cube that casters stand before.
-/// No casters, no views.
-pub fn light_views(light: &AreaLight, casters: &[Aabb]) -> LightViews {
-    let boxes: Vec<[DVec3; 8]> = casters
-        .iter()
-        .filter(|bounds| !bounds.is_empty())
-        .map(|bounds| bounds.corners().map(|corner| corner.as_dvec3()))
-        .collect();
-    let points: Vec<DVec3> = boxes.iter().flatten().copied().collect();
+/// Finds the views of a light that look at every one of `receivers`: points whose convex hulls,
+/// eight corners of a box or fewer of a clipped one, hold all surfaces that need its visibility.
+/// One fitted view serves a sun, and a light whose receivers lie within a cone; otherwise there are
+/// those faces of a cube that receivers stand before. No receivers, no views.
+///
+/// A sun's view begins before all of `casters`. Other views begin at the light.
+pub fn light_views(light: &AreaLight, receivers: &[Vec<DVec3>], casters: &Aabb) -> LightViews {
+    let points: Vec<DVec3> = receivers.iter().flatten().copied().collect();
     let mut views = LightViews {
         views: Vec::new(),
         clip_from_scene: Vec::new(),
     };
-    if points.is_empty() {
+    if points.is_empty() || casters.is_empty() {
         return views;
     }
     if light.shape.is_sun() {
-        views.push_sun(light, &points);
+        views.push_sun(light, &points, casters);
         return views;
     }
     let center = light.center.as_dvec3();
@@ -66,13 +64,12 @@ pub fn light_views(light: &AreaLight, casters: &[Aabb]) -> LightViews {
     // Reversed float depth is equally fine at every distance, so the near plane can be as close as
     // triangles can be told apart from the light itself.
     let near = (far * 1.0e-6).max(f64::from(f32::MIN_POSITIVE) * 1.0e6);
-    let inside = boxes.iter().any(|corners| surrounds(corners, center));
     let axis: DVec3 = offsets.iter().map(|q| q.normalize_or_zero()).sum();
     let axis = axis.normalize_or(light.direction.as_dvec3());
     let narrow = offsets
         .iter()
         .all(|q| q.dot(axis) > 0.0 && q.dot(axis) >= WIDEST.cos() * q.length());
-    if narrow && !inside {
+    if narrow {
         let (right, up) = axes_across(axis, light);
         let slopes = offsets.iter().map(|q| {
             let z = q.dot(axis);
@@ -85,8 +82,8 @@ pub fn light_views(light: &AreaLight, casters: &[Aabb]) -> LightViews {
     for (forward, up) in CUBE_FACES {
         let right = forward.cross(up);
         let planes = [forward + right, forward - right, forward + up, forward - up];
-        let seen = boxes.iter().any(|corners| {
-            let within = |plane: &DVec3| corners.iter().any(|p| (*p - center).dot(*plane) >= 0.0);
+        let seen = receivers.iter().any(|hull| {
+            let within = |plane: &DVec3| hull.iter().any(|p| (*p - center).dot(*plane) >= 0.0);
             planes.iter().all(within)
         });
         if seen {
@@ -107,11 +104,6 @@ const CUBE_FACES: [(DVec3, DVec3); 6] = [
     (DVec3::Z, DVec3::Y),
     (DVec3::NEG_Z, DVec3::Y),
 ];
-
-fn surrounds(corners: &[DVec3; 8], point: DVec3) -> bool {
-    let (low, high) = (corners[0], corners[7]);
-    point.cmpge(low).all() && point.cmple(high).all()
-}
 
 /// Two unit vectors that form a frame with `forward`, turned with the light.
 fn axes_across(forward: DVec3, light: &AreaLight) -> (DVec3, DVec3) {
@@ -140,11 +132,12 @@ fn bounds_of(points: impl Iterator<Item = [f64; 2]>) -> ([f64; 2], [f64; 2]) {
 }
 
 impl LightViews {
-    fn push_sun(&mut self, light: &AreaLight, points: &[DVec3]) {
+    fn push_sun(&mut self, light: &AreaLight, points: &[DVec3], casters: &Aabb) {
         let forward = light.direction.as_dvec3();
         let (right, up) = axes_across(forward, light);
         let (low, high) = bounds_of(points.iter().map(|p| [p.dot(right), p.dot(up)]));
-        let depths = points.iter().map(|p| p.dot(forward));
+        let casters = casters.corners().map(|corner| corner.as_dvec3());
+        let depths = points.iter().chain(&casters).map(|p| p.dot(forward));
         let (near, far) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| {
             (a.min(z), b.max(z))
         });
@@ -236,8 +229,14 @@ mod tests {
         }
     }
 
+    fn hulls(boxes: &[Aabb]) -> Vec<Vec<DVec3>> {
+        let corners = |bounds: &Aabb| bounds.corners().map(|c| c.as_dvec3()).to_vec();
+        boxes.iter().map(corners).collect()
+    }
+
     fn check_views(light: &AreaLight, casters: &[Aabb], expected: usize) {
-        let views = light_views(light, casters);
+        let around = casters.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
+        let views = light_views(light, &hulls(casters), &around);
         assert_eq!(views.views.len(), expected);
         let origin = if light.shape.is_sun() {
             Vec3::ZERO
@@ -292,6 +291,7 @@ mod tests {
             max: Vec3::new(20.0, -1.0, 20.0),
         };
         check_views(&light, &[floor], 5);
-        assert!(light_views(&light, &[]).views.is_empty());
+        assert!(light_views(&light, &[], &floor).views.is_empty());
+        assert!(light_views(&light, &hulls(&[floor]), &Aabb::EMPTY).views.is_empty());
     }
 }

@@ -8,6 +8,7 @@ pub use light_view::{LightView, LightViews, light_views};
 use crate::graph::{BufferId, Graph, ImageId};
 use crate::light::{AreaLight, ShapeKind};
 use crate::renderer::{PixelCamera, SceneBuffers};
+use glam::DVec3;
 
 /// How visibility is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -170,14 +171,21 @@ pub struct ShadowInputs<'f> {
     pub light: AreaLight,
     /// Camera of the picture.
     pub camera: PixelCamera,
+    /// R32_UINT, the picture's size: number of the triangle plus one; 0 where nothing was hit.
+    pub ids: ImageId,
     /// R32F, the picture's size: distance in metres along the view direction; 0 where nothing was
     /// hit.
     pub view_depth: ImageId,
     /// R32_UINT, the picture's size: geometric normal as in `common/octahedral.glsl`, turned to
     /// the camera.
     pub geometric_normal: ImageId,
+    /// Convex hulls of what the picture can show: all pixels' surfaces lie in one of them. Scene
+    /// space, metres.
+    pub receivers: Vec<Vec<DVec3>>,
     /// All triangles, which are also all casters.
     pub scene: &'f SceneBuffers,
+    /// The scene's triangles in this graph: `common/triangles.glsl`.
+    pub triangles: ImageId,
     /// The scene's vertex buffer in this graph.
     pub vertices: BufferId,
     /// The scene's index buffer in this graph.

@@ -1,5 +1,5 @@
 #version 460
-// Which triangle each pixel sees. Every triangle has a first vertex of its own, and a flat output
+// Which triangle each pixel or texel sees. Every triangle has a first vertex of its own, and a flat output
 // takes its value from there, so triangles are told apart in an indexed draw and without geometry
 // shaders.
 

@@ -19,9 +19,11 @@ unset VK_LAYER_PATH VK_ADD_LAYER_PATH LP_NATIVE_VECTOR_WIDTH
 # Tests that open a Vulkan device run one at a time, or they measure and starve each other.
 gpu_tests=()
 other_tests=()
-for file in tests/*.rs; do
+for file in tests/*.rs tests/*/main.rs; do
     [ -f "$file" ] || continue
-    name=$(basename "$file" .rs)
+    name=${file#tests/}
+    name=${name%.rs}
+    name=${name%/main}
     case $name in
         gpu_* | shader_* | capture* | cli* | embed* | host* | golden*) gpu_tests+=(--test "$name") ;;
         *) other_tests+=(--test "$name") ;;

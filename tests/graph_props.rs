@@ -5,9 +5,7 @@ mod random_graph;
 
 use antumbra::ash::vk;
 use antumbra::graph::simulate::{Problem, simulate};
-use antumbra::graph::{
-    Batch, FakeMemory, Mode, Part, Plan, ResourceOrigin, ResourceShape,
-};
+use antumbra::graph::{Batch, FakeMemory, Mode, Part, Plan, ResourceOrigin, ResourceShape};
 use proptest::prelude::*;
 use random_graph::{Limits, Nothing, random_graph};
 
@@ -77,7 +75,7 @@ fn spoilt_barriers(plan: &Plan) -> Vec<(String, Plan)> {
 fn batch(plan: &Plan, number: usize) -> Option<&Batch> {
     match plan.steps.get(number / 2) {
         None => Some(&plan.leave),
-        Some(step) if number % 2 == 0 => Some(&step.hand_over),
+        Some(step) if number.is_multiple_of(2) => Some(&step.hand_over),
         Some(step) => Some(&step.barriers),
     }
 }
@@ -85,13 +83,15 @@ fn batch(plan: &Plan, number: usize) -> Option<&Batch> {
 fn batch_mut(plan: &mut Plan, number: usize) -> Option<&mut Batch> {
     match plan.steps.get_mut(number / 2) {
         None => Some(&mut plan.leave),
-        Some(step) if number % 2 == 0 => Some(&mut step.hand_over),
+        Some(step) if number.is_multiple_of(2) => Some(&mut step.hand_over),
         Some(step) => Some(&mut step.barriers),
     }
 }
 
 fn bits(mask: u64) -> impl Iterator<Item = u64> {
-    (0..64).map(|bit| 1 << bit).filter(move |bit| mask & bit != 0)
+    (0..64)
+        .map(|bit| 1 << bit)
+        .filter(move |bit| mask & bit != 0)
 }
 
 /// Every plan in which one transient was moved to where it must not be.
@@ -242,7 +242,11 @@ fn random_graphs_are_not_trivial() {
         passes += plan.passes.len();
         culled += plan.culled.len();
         barriers += plan.barrier_count();
-        handed += plan.steps.iter().filter(|s| !s.hand_over.barriers.is_empty()).count();
+        handed += plan
+            .steps
+            .iter()
+            .filter(|s| !s.hand_over.barriers.is_empty())
+            .count();
         aliased += usize::from(plan.peak_bytes() < plan.unaliased_bytes());
         spoilt += spoilt_barriers(&plan).len() + misplaced(&plan).len();
     }

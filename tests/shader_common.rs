@@ -1,107 +1,199 @@
-//! Functions of `glsl/common/` do the same as their Rust twins.
+//! Functions of `glsl/common/` do the same as their Rust twins, and shared structs lie the same.
 
 mod support;
 
 use antumbra::gpu::{ComputePipelineDesc, GpuError, MemoryLocation, SetWrite};
+use antumbra::light::{AreaLight, LightShape};
+use antumbra::renderer::{LightPush, PixelCamera};
 use antumbra::scene::{Aabb, SceneCamera};
+use antumbra::shadow::hard::HardParams;
+use antumbra::shadow::{LightView, light_views};
 use glam::{UVec2, Vec3, Vec4};
 use support::work::{COMPUTE, STORAGE, bind, full_barrier, storage};
 use support::{compile, destroy_clean, gpu, serial};
 
-/// One pixel a workgroup: in (x, y, depth, near) out (position, hit).
-const POSITIONS: &str = "#version 460
-#extension GL_GOOGLE_include_directive : require
-#include \"common/depth.glsl\"
-layout(local_size_x = 1) in;
-layout(binding = 0, std430) readonly buffer In { vec4 source[]; };
-layout(binding = 1, std430) writeonly buffer Out { vec4 result[]; };
-layout(push_constant) uniform Push { uvec2 size_texels; float tan_half_fov; } push;
-void main() {
-    vec4 s = source[gl_WorkGroupID.x];
-    vec3 position_vs = pixel_position_vs(uvec2(s.xy), push.size_texels, s.z, s.w, push.tan_half_fov);
-    result[gl_WorkGroupID.x] = vec4(position_vs, is_hit(s.z) ? 1.0 : 0.0);
-}
-";
-
-#[test]
-fn a_pixel_and_its_depth_give_back_the_point_on_the_cameras_ray() {
-    let _one = serial();
-    let mut bounds = Aabb::default();
-    bounds.insert(Vec3::splat(-2.0));
-    bounds.insert(Vec3::splat(3.0));
-    let camera = SceneCamera::framing(&bounds);
-    let size = UVec2::new(97, 61);
-    let aspect = size.x as f32 / size.y as f32;
-    let (view, clip) = (camera.view(), camera.view_projection_reversed(aspect));
-    let mut source = Vec::new();
-    let mut expected = Vec::new();
-    for (x, y) in [(0, 0), (96, 0), (48, 30), (13, 57), (96, 60)] {
-        for distance in [1.5, 7.0, 400.0] {
-            let ray = camera.ray(UVec2::new(x, y), size);
-            let position = ray.origin + ray.direction * distance;
-            let c = clip * position.extend(1.0);
-            // The point is drawn at its pixel's centre.
-            let at = (Vec4::new(c.x, c.y, 0.0, 0.0) / c.w * 0.5 + 0.5)
-                * size.extend(0).extend(0).as_vec4();
-            assert!(
-                (at.x - x as f32 - 0.5).abs() < 1e-3 && (at.y - y as f32 - 0.5).abs() < 1e-3,
-                "{at}"
-            );
-            source.push([x as f32, y as f32, c.z / c.w, camera.znear]);
-            expected.push((view * position.extend(1.0)).truncate());
-        }
-    }
-    // Nothing hit: finite, and no hit.
-    source.push([5.0, 5.0, 0.0, camera.znear]);
-
+/// Runs `body`, which makes `vec4 r` of `vec4 s`, once for each element, after `head`.
+fn map(head: &str, body: &str, push: &[u8], source: &[[f32; 4]]) -> Vec<[f32; 4]> {
+    let shader = compile(
+        COMPUTE,
+        &format!(
+            "#version 460
+            #extension GL_GOOGLE_include_directive : require
+            layout(local_size_x = 1) in;
+            layout(binding = 0, std430) readonly buffer In {{ vec4 source[]; }};
+            layout(binding = 1, std430) writeonly buffer Out {{ vec4 result[]; }};
+            {head}
+            void main() {{
+                vec4 s = source[gl_WorkGroupID.x];
+                vec4 r;
+                {body}
+                result[gl_WorkGroupID.x] = r;
+            }}"
+        ),
+    );
     let mut gpu = gpu();
-    let bytes = size_of_val(&source[..]) as u64;
+    let bytes = size_of_val(source) as u64;
     let mut input = gpu
-        .create_buffer("pixels", bytes, STORAGE, MemoryLocation::CpuToGpu)
+        .create_buffer("source", bytes, STORAGE, MemoryLocation::CpuToGpu)
         .unwrap();
     let output = gpu
-        .create_buffer("positions", bytes, STORAGE, MemoryLocation::GpuToCpu)
+        .create_buffer("result", bytes, STORAGE, MemoryLocation::GpuToCpu)
         .unwrap();
-    input
-        .mapped_mut()
-        .unwrap()
-        .copy_from_slice(bytemuck::cast_slice(&source));
+    let target = input.mapped_mut().unwrap();
+    target.copy_from_slice(bytemuck::cast_slice(source));
     gpu.run(|gpu, cmd| -> Result<(), GpuError> {
-        let pipeline =
-            gpu.compute_pipeline(&ComputePipelineDesc::new(compile(COMPUTE, POSITIONS)))?;
+        let pipeline = gpu.compute_pipeline(&ComputePipelineDesc::new(shader))?;
         let set = gpu.allocate_set(&pipeline)?;
-        let writes = [
-            SetWrite {
-                binding: 0,
-                resource: storage(input.raw),
-            },
-            SetWrite {
-                binding: 1,
-                resource: storage(output.raw),
-            },
-        ];
-        gpu.write_set(set, &writes)?;
-        let push = [size.x, size.y, (camera.tan_half_fov() as f32).to_bits()];
-        bind(gpu, cmd, &pipeline, Some(set), bytemuck::cast_slice(&push));
+        let buffers = [input.raw, output.raw].into_iter().zip(0..);
+        let writes = buffers.map(|(buffer, binding)| SetWrite {
+            binding,
+            resource: storage(buffer),
+        });
+        gpu.write_set(set, &writes.collect::<Vec<_>>())?;
+        bind(gpu, cmd, &pipeline, Some(set), push);
         // SAFETY: everything the dispatch needs is bound.
         unsafe { gpu.device().cmd_dispatch(cmd, source.len() as u32, 1, 1) };
         full_barrier(gpu, cmd);
         Ok(())
     })
     .unwrap();
-    let results: Vec<[f32; 4]> = bytemuck::cast_slice(output.mapped().unwrap()).to_vec();
-    for ((result, expected), source) in results.iter().zip(&expected).zip(&source) {
-        let position = Vec3::from_slice(result);
-        let error = (position - *expected).length() / expected.length();
-        assert!(error < 1e-5, "{source:?}: {position} is not {expected}");
-        assert_eq!(result[3], 1.0);
-    }
-    let miss = results[expected.len()];
-    assert!(
-        miss.iter().all(|v| v.is_finite()) && miss[3] == 0.0,
-        "{miss:?}"
-    );
+    let result = bytemuck::cast_slice(output.mapped().unwrap()).to_vec();
     gpu.destroy_buffer(input);
     gpu.destroy_buffer(output);
     destroy_clean(gpu);
+    result
+}
+
+/// Unit vectors all over the sphere, the poles and seams of the octahedron among them.
+fn directions() -> Vec<Vec3> {
+    let mut all = vec![
+        Vec3::X,
+        Vec3::NEG_X,
+        Vec3::Y,
+        Vec3::NEG_Y,
+        Vec3::Z,
+        Vec3::NEG_Z,
+    ];
+    for i in 0..200 {
+        let z = 1.0 - (2.0 * i as f32 + 1.0) / 200.0;
+        let angle = 2.399_963 * i as f32;
+        let r = (1.0 - z * z).sqrt();
+        all.push(Vec3::new(r * angle.cos(), r * angle.sin(), z));
+    }
+    all
+}
+
+#[test]
+fn a_unit_vector_survives_32_bits() {
+    let _one = serial();
+    let source: Vec<[f32; 4]> = directions()
+        .iter()
+        .map(|d| d.extend(0.0).to_array())
+        .collect();
+    let head = "#include \"common/octahedral.glsl\"";
+    let body = "r = vec4(unpack_unit(pack_unit(s.xyz)), 0.0);";
+    for (result, expected) in map(head, body, &[], &source).iter().zip(directions()) {
+        let error = (Vec3::from_slice(result) - expected).length();
+        assert!(error < 6.0e-5, "{expected}: {error}");
+    }
+}
+
+#[test]
+fn pixel_rays_are_those_of_the_camera() {
+    let _one = serial();
+    let mut bounds = Aabb::EMPTY;
+    bounds.insert(Vec3::splat(-2.0));
+    bounds.insert(Vec3::splat(3.0));
+    let camera = SceneCamera::framing(&bounds);
+    let size = UVec2::new(97, 61);
+    let pixels = PixelCamera::new(&camera, size.to_array());
+    let source: Vec<[f32; 4]> = [(0, 0), (96, 0), (48, 30), (13, 57), (96, 60)]
+        .map(|(x, y)| [x as f32, y as f32, 0.0, 0.0])
+        .to_vec();
+    let head = "#include \"common/camera.glsl\"
+        layout(push_constant) uniform Push { Camera camera; } push;";
+    let body = "vec3 ray = pixel_ray(push.camera, uvec2(s.xy));
+        r = vec4(ray, dot(ray, view_forward(push.camera)));";
+    let results = map(head, body, bytemuck::bytes_of(&pixels), &source);
+    for (result, source) in results.iter().zip(&source) {
+        let pixel = UVec2::new(source[0] as u32, source[1] as u32);
+        let expected = camera.ray(pixel, size).direction;
+        let ray = Vec3::from_slice(result);
+        assert!(
+            (ray.normalize() - expected).length() < 1.0e-6,
+            "{ray} {expected}"
+        );
+        assert!(
+            (result[3] - 1.0).abs() < 1.0e-5,
+            "of length 1 along the view"
+        );
+    }
+}
+
+/// A point on a plane projects where the clip matrix puts it, and the plane's depth there, predicted
+/// from any other point of the plane, is the point's own.
+#[test]
+fn a_plane_has_the_depth_that_is_predicted_for_it() {
+    let _one = serial();
+    let mut bounds = Aabb::EMPTY;
+    bounds.insert(Vec3::new(-2.0, -1.0, -2.0));
+    bounds.insert(Vec3::new(2.0, 1.0, 2.0));
+    let hull = bounds.corners().map(|corner| corner.as_dvec3()).to_vec();
+    let above = Vec3::new(0.5, 6.0, 1.0);
+    let disk = LightShape::Disk { radius: 0.2 };
+    let sun = LightShape::Sun {
+        angular_diameter: 0.01,
+    };
+    for shape in [disk, sun] {
+        let light = AreaLight::new(shape, above, Vec3::new(0.1, -1.0, 0.2), Vec3::X);
+        let views = light_views(&light, std::slice::from_ref(&hull), &bounds);
+        let (view, clip) = (views.views[0], views.clip_from_scene[0]);
+        let origin = if light.shape.is_sun() {
+            Vec3::ZERO
+        } else {
+            above
+        };
+        let normal = Vec3::new(0.3, 0.9, -0.2).normalize();
+        let on_plane = |x: f32, z: f32| {
+            let y = -(normal.x * x + normal.z * z) / normal.y;
+            Vec3::new(x, y, z)
+        };
+        let points =
+            [(-1.0, 0.4), (0.0, 0.0), (1.3, -0.7), (0.2, 1.4)].map(|(x, z)| on_plane(x, z));
+        let source = points.map(|p| (p - origin).extend(0.0).to_array());
+        let anchor = on_plane(0.6, -1.1) - origin;
+        let push: Vec<f32> = [view.right, view.up, view.forward, view.scale]
+            .into_iter()
+            .flatten()
+            .chain(anchor.extend(0.0).to_array())
+            .chain(normal.extend(0.0).to_array())
+            .collect();
+        let head = "#include \"common/light_view.glsl\"
+            layout(push_constant) uniform Push { LightView view; vec4 q; vec4 n; } push;";
+        let body = "r = vec4(light_view_project(push.view, s.xyz), 0.0);
+            r.w = light_view_plane(push.view, push.q.xyz, push.n.xyz, r.xy).x;";
+        let results = map(head, body, bytemuck::cast_slice(&push), &source);
+        for (result, point) in results.iter().zip(points) {
+            let c = clip * Vec4::from((point, 1.0));
+            let ndc = c.truncate() / c.w;
+            let expected = Vec3::new(0.5 * ndc.x + 0.5, 0.5 * ndc.y + 0.5, ndc.z);
+            let error = (Vec3::from_slice(result) - expected).abs();
+            assert!(error.max_element() < 2.0e-6, "{result:?} {expected}");
+            assert!((result[3] / result[2] - 1.0).abs() < 1.0e-5, "{result:?}");
+        }
+    }
+}
+
+#[test]
+fn structs_shared_with_shaders_lie_the_same() {
+    assert_layout!(PixelCamera { eye, corner_ray, pixel_right, pixel_down }
+        = "Camera" in "gbuffer/surface.frag");
+    assert_layout!(LightView { right, up, forward, scale }
+        = "LightView" in "hard/visibility.comp");
+    assert_layout!(HardParams { camera, light, counts, views }
+        = "HardParams" in "hard/visibility.comp");
+    assert_layout!(LightPush {
+        eye, inverse_range, corner_ray, cos_inner, pixel_right, cos_outer, pixel_down, one_sided,
+        light, positional, direction, unused, intensity, unused_too,
+    } = "Push" in "shade/light.frag");
 }

@@ -143,7 +143,9 @@ impl<'s> FrameRenderer<'s> {
         let bytes = pixels * (16 + 4 * (images - 1));
         let usage = vk::BufferUsageFlags::TRANSFER_DST;
         let location = MemoryLocation::GpuToCpu;
-        let target = self.gpu.create_buffer("read back", bytes, usage, location)?;
+        let target = self
+            .gpu
+            .create_buffer("read back", bytes, usage, location)?;
         let result = self.render_into(request, &lights, &target);
         let frame = result.map(|frame| fill(frame, &target, request));
         self.gpu.destroy_buffer(target);
@@ -182,11 +184,13 @@ impl<'s> FrameRenderer<'s> {
         let compiled = graph.compile(&self.gpu)?;
         let plan = compiled.plan().clone();
         let cache = &mut self.cache;
-        let report = self
-            .gpu
-            .run(|gpu, cmd| compiled.record(gpu, cache, cmd))?;
+        let report = self.gpu.run(|gpu, cmd| compiled.record(gpu, cache, cmd))?;
         let mut passes = self.gpu.collect_timings();
-        let copies: f64 = passes.iter().filter(|(n, _)| n == "read back").map(|(_, ms)| ms).sum();
+        let copies: f64 = passes
+            .iter()
+            .filter(|(n, _)| n == "read back")
+            .map(|(_, ms)| ms)
+            .sum();
         passes.retain(|(name, _)| name != "read back");
         let frame_ms = (start.elapsed().as_secs_f64() * 1.0e3 - copies).max(0.0);
         let counters = self.counters(&plan, &report, self.gpu.pipelines_created() - pipelines);
@@ -216,7 +220,10 @@ impl<'s> FrameRenderer<'s> {
             ("transient_bytes", plan.peak_bytes()),
             ("transient_bytes_unaliased", plan.unaliased_bytes()),
             ("triangles", self.buffers.triangle_count() as u64),
-            ("triangles_without_area", self.buffers.degenerate_count() as u64),
+            (
+                "triangles_without_area",
+                self.buffers.degenerate_count() as u64,
+            ),
         ];
         counts.map(|(name, count)| (name.to_string(), count)).into()
     }
@@ -336,7 +343,10 @@ fn captured_lights(request: &FrameRequest, frame: &Frame, plan: &Plan) -> Vec<Ca
     let pairs = request.lights.iter().zip(&frame.visibility_passes);
     pairs
         .map(|(light, range)| {
-            let own = plan.passes.iter().filter(|pass| range.contains(&pass.declared));
+            let own = plan
+                .passes
+                .iter()
+                .filter(|pass| range.contains(&pass.declared));
             CapturedLight {
                 light: *light,
                 visibility: Vec::new(),

@@ -188,9 +188,10 @@ impl<'f> Graph<'f> {
     /// An image of which the last frame's contents can still be read. Writing `current` keeps the
     /// writer alive.
     pub fn history_image(&mut self, key: &'static str, desc: ImageDesc) -> History {
-        let twice = self.decl.resources.iter().any(
-            |r| matches!(r.origin, Origin::HistoryCurrent { key: other, .. } if other == key),
-        );
+        let twice =
+            self.decl.resources.iter().any(
+                |r| matches!(r.origin, Origin::HistoryCurrent { key: other, .. } if other == key),
+            );
         if twice {
             self.decl.error.get_or_insert(GraphError::DuplicateHistory {
                 key: key.to_string(),

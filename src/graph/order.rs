@@ -7,10 +7,7 @@ use super::{Declarations, Origin};
 use ash::vk::ImageLayout;
 
 /// Refuses reads of what nobody wrote: such a pass would show whatever memory held.
-pub(crate) fn check_initialised(
-    decl: &Declarations,
-    maps: &[CellMap],
-) -> Result<(), GraphError> {
+pub(crate) fn check_initialised(decl: &Declarations, maps: &[CellMap]) -> Result<(), GraphError> {
     let mut written: Vec<Vec<bool>> = decl
         .resources
         .iter()

@@ -85,8 +85,7 @@ pub(crate) struct UseDecl {
     pub mode: Mode,
 }
 
-pub(crate) type RecordFn<'f> =
-    Box<dyn FnOnce(&mut PassContext<'_>) -> Result<(), GpuError> + 'f>;
+pub(crate) type RecordFn<'f> = Box<dyn FnOnce(&mut PassContext<'_>) -> Result<(), GpuError> + 'f>;
 
 pub(crate) struct PassDecl {
     pub name: Name,
@@ -204,7 +203,11 @@ impl<'f> PassBuilder<'_, 'f> {
         mode: Mode,
     ) -> R {
         let version = id.version();
-        match self.graph.decl.check_use(self.pass, version, part, access, mode) {
+        match self
+            .graph
+            .decl
+            .check_use(self.pass, version, part, access, mode)
+        {
             Err(error) => {
                 self.graph.decl.error.get_or_insert(error);
                 id
@@ -360,7 +363,10 @@ fn inside(part: Part, whole: Part) -> bool {
             span(p.base_mip, p.mips, w.mips) && span(p.base_layer, p.layers, w.layers)
         }
         (Part::Buffer(p), Part::Buffer(w)) => {
-            p.size > 0 && p.offset.checked_add(p.size).is_some_and(|last| last <= w.size)
+            p.size > 0
+                && p.offset
+                    .checked_add(p.size)
+                    .is_some_and(|last| last <= w.size)
         }
         _ => false,
     }

@@ -1,9 +1,9 @@
 //! The compiled plan: plain data that can be printed, compared, replayed and changed.
 
+use super::Name;
 use super::access::Access;
 use super::pass::{Attachment, Mode, PassKind};
 use super::resource::{BufferDesc, ImageDesc, ImageState, Part};
-use super::Name;
 use ash::vk;
 
 /// Everything that recording a frame needs to know, and nothing that depends on a device.

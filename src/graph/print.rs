@@ -87,12 +87,13 @@ impl Plan {
         if let Some(transition) = barrier.transition {
             let _ = write!(text, " {:?} -> {:?}", transition.old, transition.new);
         }
-        let side = |stages: vk::PipelineStageFlags2, access: vk::AccessFlags2| {
-            match (stages.is_empty(), access.is_empty()) {
-                (true, _) => "nothing".to_string(),
-                (false, true) => format!("{stages:?}"),
-                (false, false) => format!("{stages:?} {access:?}"),
-            }
+        let side = |stages: vk::PipelineStageFlags2, access: vk::AccessFlags2| match (
+            stages.is_empty(),
+            access.is_empty(),
+        ) {
+            (true, _) => "nothing".to_string(),
+            (false, true) => format!("{stages:?}"),
+            (false, false) => format!("{stages:?} {access:?}"),
         };
         let _ = write!(
             text,
@@ -108,7 +109,7 @@ impl Plan {
         let mut dot = String::from("digraph frame {\n  rankdir=LR;\n  node [fontsize=10];\n");
         for (index, resource) in self.resources.iter().enumerate() {
             if resource.steps.is_some() {
-                let label = quote(&resource.to_string().replacen(", ", "\\n", 1));
+                let label = quote(&resource.to_string().replacen(", ", "\n", 1));
                 let _ = writeln!(dot, "  r{index} [shape=ellipse, label={label}];");
             }
         }
@@ -135,7 +136,7 @@ impl Plan {
             }
         }
         for pass in &self.culled {
-            let label = quote(&format!("{}\\n{}", pass.name, pass.reason));
+            let label = quote(&format!("{}\n{}", pass.name, pass.reason));
             let id = pass.declared;
             let _ = writeln!(dot, "  c{id} [shape=box, style=dashed, label={label}];");
         }
@@ -145,7 +146,8 @@ impl Plan {
 }
 
 fn quote(text: &str) -> String {
-    format!("\"{}\"", text.replace('"', "\\\""))
+    let text = text.replace('\\', "\\\\").replace('"', "\\\"");
+    format!("\"{}\"", text.replace('\n', "\\n"))
 }
 
 impl fmt::Display for PlanResource {

@@ -125,7 +125,9 @@ impl ImagePart {
 impl fmt::Display for ImagePart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (m, l) = (self.base_mip, self.base_layer);
-        write!(f, "mips {m}..{} layers {l}..{}", m + self.mips, l + self.layers)
+        // Errors show parts that no resource has, so the sums may not fit.
+        let (mips, layers) = (m.saturating_add(self.mips), l.saturating_add(self.layers));
+        write!(f, "mips {m}..{mips} layers {l}..{layers}")
     }
 }
 
@@ -140,7 +142,8 @@ pub struct BufferPart {
 
 impl fmt::Display for BufferPart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "bytes {}..{}", self.offset, self.offset + self.size)
+        let end = self.offset.saturating_add(self.size);
+        write!(f, "bytes {}..{end}", self.offset)
     }
 }
 

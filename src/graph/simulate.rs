@@ -112,7 +112,8 @@ impl Event {
 
     /// Whether the write was made available before anything that these stages do now.
     fn available_before(&self, stages: Stages) -> bool {
-        self.flushes.iter().any(|behind| behind.contains(stages))
+        let before = |stage| self.flushes.iter().any(|behind| behind.contains(stage));
+        stage_bits(stages).all(before)
     }
 
     fn flushed_by(&self, barrier: &Barrier) -> bool {
@@ -385,7 +386,14 @@ impl<'p> Replay<'p> {
                 if let Some(needed) = layout.filter(|needed| *needed != found) {
                     self.object(&pass.name, cell, Problem::WrongLayout { needed, found });
                 }
-                self.check_access(cell, stages, info.access, used.mode, used.access.reads(), pass);
+                self.check_access(
+                    cell,
+                    stages,
+                    info.access,
+                    used.mode,
+                    used.access.reads(),
+                    pass,
+                );
                 done.push((cell, stages, info.access, used.mode));
             }
         }

@@ -48,7 +48,9 @@ pub fn frustum_sees(clip_from_scene: &Mat4, bounds: &Aabb) -> bool {
     if bounds.is_empty() {
         return false;
     }
-    let corners = bounds.corners().map(|corner| *clip_from_scene * Vec4::from((corner, 1.0)));
+    let corners = bounds
+        .corners()
+        .map(|corner| *clip_from_scene * Vec4::from((corner, 1.0)));
     let outside = |distance: fn(&Vec4) -> f32| corners.iter().all(|c| distance(c) < 0.0);
     !(outside(|c| c.w + c.x)
         || outside(|c| c.w - c.x)

@@ -21,7 +21,7 @@ pub use camera::{PixelCamera, frustum_sees};
 pub use draw::draw_ids;
 pub use gbuffer::{GBuffer, add_gbuffer};
 pub use scene_buffers::{Draw, SceneBuffers, SceneIds, UploadError};
-pub use shade::{Ambient, add_shading};
+pub use shade::{Ambient, LightPush, add_shading};
 pub use visible::visible_hulls;
 
 use crate::graph::{Graph, ImageId};

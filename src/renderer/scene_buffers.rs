@@ -172,14 +172,27 @@ impl SceneBuffers {
         let index = vk::BufferUsageFlags::INDEX_BUFFER | target;
         let only = MemoryLocation::GpuOnly;
         let sampled = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-        let spec = |desc: ImageDesc| ImageSpec::new_2d(desc.format, desc.width, desc.height, sampled);
+        let spec =
+            |desc: ImageDesc| ImageSpec::new_2d(desc.format, desc.width, desc.height, sampled);
 
         let mut made = Made::default();
         let result = (|| {
-            made.buffers.push(gpu.create_buffer("scene vertices", sizes.vertex_bytes, vertex, only)?);
-            made.buffers.push(gpu.create_buffer("scene indices", sizes.index_bytes, index, only)?);
-            made.images.push(gpu.create_image("scene triangles", &spec(sizes.triangles))?);
-            made.images.push(gpu.create_image("scene materials", &spec(sizes.materials))?);
+            made.buffers.push(gpu.create_buffer(
+                "scene vertices",
+                sizes.vertex_bytes,
+                vertex,
+                only,
+            )?);
+            made.buffers.push(gpu.create_buffer(
+                "scene indices",
+                sizes.index_bytes,
+                index,
+                only,
+            )?);
+            made.images
+                .push(gpu.create_image("scene triangles", &spec(sizes.triangles))?);
+            made.images
+                .push(gpu.create_image("scene materials", &spec(sizes.materials))?);
             let mut graph = Graph::new();
             for (buffer, bytes) in made.buffers.iter().zip([
                 bytemuck::cast_slice(&layout.vertices),
@@ -202,19 +215,25 @@ impl SceneBuffers {
         })();
         if let Err(error) = result {
             // Commands that use them may have been recorded.
-            made.buffers.into_iter().for_each(|b| gpu.retire(Retired::Buffer(b)));
-            made.images.into_iter().for_each(|i| gpu.retire(Retired::Image(i)));
+            made.buffers
+                .into_iter()
+                .for_each(|b| gpu.retire(Retired::Buffer(b)));
+            made.images
+                .into_iter()
+                .for_each(|i| gpu.retire(Retired::Image(i)));
             return Err(error);
         }
         let mut buffers = made.buffers.into_iter();
         let mut images = made.images.into_iter();
         match (buffers.next(), buffers.next(), images.next(), images.next()) {
-            (Some(vertices), Some(indices), Some(triangles), Some(materials)) => Ok(DeviceBuffers {
-                vertices,
-                indices,
-                triangles,
-                materials,
-            }),
+            (Some(vertices), Some(indices), Some(triangles), Some(materials)) => {
+                Ok(DeviceBuffers {
+                    vertices,
+                    indices,
+                    triangles,
+                    materials,
+                })
+            }
             _ => unreachable!("two buffers and two images were made above"),
         }
     }
@@ -327,7 +346,9 @@ fn stage(
     let size = bytes.len() as u64;
     let usage = vk::BufferUsageFlags::TRANSFER_SRC;
     let mut buffer = gpu.create_buffer("upload", size, usage, MemoryLocation::CpuToGpu)?;
-    let mapped = buffer.mapped_mut().map(|target| target.copy_from_slice(bytes));
+    let mapped = buffer
+        .mapped_mut()
+        .map(|target| target.copy_from_slice(bytes));
     let raw = buffer.raw;
     staging.push(buffer);
     if mapped.is_none() {
@@ -486,7 +507,12 @@ impl Layout {
             position: point.to_array(),
             triangle,
         });
-        [self.vertices.len() - 1, base + corners[1], base + corners[2]].map(|v| v as u32)
+        [
+            self.vertices.len() - 1,
+            base + corners[1],
+            base + corners[2],
+        ]
+        .map(|v| v as u32)
     }
 }
 
@@ -548,9 +574,15 @@ mod tests {
         let layout = Layout::new(&scene);
         assert_eq!(layout.degenerate, 1);
         assert_eq!(layout.indices.len(), 2400);
-        assert!(layout.vertices.len() < 2 * positions.len(), "few vertices are added");
+        assert!(
+            layout.vertices.len() < 2 * positions.len(),
+            "few vertices are added"
+        );
         for (number, triangle) in layout.indices.chunks_exact(3).enumerate() {
-            assert_eq!(layout.vertices[triangle[0] as usize].triangle, number as u32);
+            assert_eq!(
+                layout.vertices[triangle[0] as usize].triangle,
+                number as u32
+            );
             // The same corners in the same sense of rotation.
             let points = [0, 1, 2].map(|i| layout.vertices[triangle[i] as usize].position);
             let wanted = [0, 1, 2].map(|i| positions[original[3 * number + i] as usize].to_array());

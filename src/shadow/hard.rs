@@ -11,9 +11,7 @@
 use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
 use super::{ShadowInputs, ShadowMask};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{
-    Access, Bind, BufferDesc, Graph, ImageDesc, ImagePart, Load, PassKind, Stage,
-};
+use crate::graph::{Access, Bind, BufferDesc, Graph, ImageDesc, ImagePart, Load, PassKind, Stage};
 use crate::renderer::{PixelCamera, draw_ids};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};

@@ -81,7 +81,8 @@ pub fn light_views(light: &AreaLight, receivers: &[Vec<DVec3>], casters: &Aabb) 
     }
     for (forward, up) in CUBE_FACES {
         let right = forward.cross(up);
-        let planes = [forward + right, forward - right, forward + up, forward - up];
+        let sides = [right, -right, up, -up].map(|side| forward + side);
+        let planes = [forward, sides[0], sides[1], sides[2], sides[3]];
         let seen = receivers.iter().any(|hull| {
             let within = |plane: &DVec3| hull.iter().any(|p| (*p - center).dot(*plane) >= 0.0);
             planes.iter().all(within)
@@ -188,9 +189,8 @@ impl LightViews {
             Some(_) => plane(forward),
             None => DVec4::W,
         };
-        let clip_axis = |axis: DVec3, i: usize| {
-            (plane(axis) - one * corner[i]) * (2.0 * scale[i]) - one
-        };
+        let clip_axis =
+            |axis: DVec3, i: usize| (plane(axis) - one * corner[i]) * (2.0 * scale[i]) - one;
         let clip_z = match center {
             Some(_) => DVec4::W * depth[0],
             None => plane(forward) * depth[0] + DVec4::W * depth[1],
@@ -292,6 +292,10 @@ mod tests {
         };
         check_views(&light, &[floor], 5);
         assert!(light_views(&light, &[], &floor).views.is_empty());
-        assert!(light_views(&light, &hulls(&[floor]), &Aabb::EMPTY).views.is_empty());
+        assert!(
+            light_views(&light, &hulls(&[floor]), &Aabb::EMPTY)
+                .views
+                .is_empty()
+        );
     }
 }

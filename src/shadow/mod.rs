@@ -88,9 +88,9 @@ impl Technique {
     /// Where it was published.
     pub fn paper(self) -> Option<&'static str> {
         match self {
-            Technique::Hard => Some(
-                "L. Williams: Casting Curved Shadows on Curved Surfaces. SIGGRAPH 1978",
-            ),
+            Technique::Hard => {
+                Some("L. Williams: Casting Curved Shadows on Curved Surfaces. SIGGRAPH 1978")
+            }
         }
     }
 

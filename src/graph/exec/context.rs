@@ -174,7 +174,11 @@ impl PassContext<'_> {
     pub fn dispatch_indirect(&mut self, arguments: BufferId, offset: u64) -> Result<(), GpuError> {
         let buffer = self.indirect(arguments)?;
         // SAFETY: as for `dispatch`; the buffer was declared for indirect arguments.
-        unsafe { self.gpu.device().cmd_dispatch_indirect(self.cmd, buffer, offset) };
+        unsafe {
+            self.gpu
+                .device()
+                .cmd_dispatch_indirect(self.cmd, buffer, offset)
+        };
         Ok(())
     }
 
@@ -222,7 +226,11 @@ impl PassContext<'_> {
     pub fn draw_indirect(&mut self, arguments: BufferId, offset: u64) -> Result<(), GpuError> {
         let buffer = self.indirect(arguments)?;
         // SAFETY: as for `draw`; the buffer was declared for indirect arguments.
-        unsafe { self.gpu.device().cmd_draw_indirect(self.cmd, buffer, offset, 1, 16) };
+        unsafe {
+            self.gpu
+                .device()
+                .cmd_draw_indirect(self.cmd, buffer, offset, 1, 16)
+        };
         Ok(())
     }
 
@@ -291,12 +299,21 @@ impl PassContext<'_> {
             self.handles.buffers[target.resource],
         );
         // SAFETY: `cmd` is recording outside rendering; both were declared for the copy.
-        unsafe { self.gpu.device().cmd_copy_buffer(self.cmd, from, to, &[region]) };
+        unsafe {
+            self.gpu
+                .device()
+                .cmd_copy_buffer(self.cmd, from, to, &[region])
+        };
         Ok(())
     }
 
     /// Fills a part of a buffer with one 32-bit value. Offset and size are multiples of 4.
-    pub fn fill_buffer(&mut self, id: BufferId, part: BufferPart, value: u32) -> Result<(), GpuError> {
+    pub fn fill_buffer(
+        &mut self,
+        id: BufferId,
+        part: BufferPart,
+        value: u32,
+    ) -> Result<(), GpuError> {
         let used = self.find(id.0.resource, None, |a| a == Access::Clear)?;
         let buffer = self.handles.buffers[used.resource];
         let device = self.gpu.device();
@@ -306,7 +323,12 @@ impl PassContext<'_> {
     }
 
     /// Writes bytes into a buffer, at most 65,536, a multiple of 4.
-    pub fn update_buffer(&mut self, id: BufferId, offset: u64, bytes: &[u8]) -> Result<(), GpuError> {
+    pub fn update_buffer(
+        &mut self,
+        id: BufferId,
+        offset: u64,
+        bytes: &[u8],
+    ) -> Result<(), GpuError> {
         let used = self.find(id.0.resource, None, |a| a == Access::Clear)?;
         let buffer = self.handles.buffers[used.resource];
         let device = self.gpu.device();
@@ -414,7 +436,9 @@ impl PassContext<'_> {
                 let used = *self.find(id.0.resource, bind.part, texels)?;
                 let (buffer, offset, range) = self.span(&used);
                 let name = &self.plan.resources[used.resource].name;
-                let view = self.gpu.create_buffer_view(name, buffer, *format, offset, range)?;
+                let view = self
+                    .gpu
+                    .create_buffer_view(name, buffer, *format, offset, range)?;
                 self.gpu.retire(crate::gpu::Retired::BufferView(view));
                 Ok(SetResource::UniformTexelBuffer(view))
             }
@@ -524,7 +548,10 @@ impl PassContext<'_> {
         found.ok_or_else(|| {
             let name = self.plan.resources.get(resource).map(|r| r.name.as_ref());
             let name = name.unwrap_or("another graph's resource");
-            misuse(self.pass, format!("uses `{name}` in a way it did not declare"))
+            misuse(
+                self.pass,
+                format!("uses `{name}` in a way it did not declare"),
+            )
         })
     }
 }

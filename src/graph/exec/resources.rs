@@ -62,7 +62,9 @@ impl MemoryModel for Gpu {
                 self.memory_requirements_image(&spec(desc, *usage).create_info())
             }
             ResourceShape::Buffer { desc, usage } => {
-                let info = vk::BufferCreateInfo::default().size(desc.size).usage(*usage);
+                let info = vk::BufferCreateInfo::default()
+                    .size(desc.size)
+                    .usage(*usage);
                 self.memory_requirements_buffer(&info)
             }
         };
@@ -145,7 +147,11 @@ impl FrameCache {
                 _ => continue,
             };
             if let Some(pair) = self.history.get(key) {
-                let which = if previous { 1 - pair.current } else { pair.current };
+                let which = if previous {
+                    1 - pair.current
+                } else {
+                    pair.current
+                };
                 handles.images[index] = pair.images[which].raw;
             }
         }
@@ -174,7 +180,10 @@ impl FrameCache {
             resources: resources.collect(),
         };
         let slot = gpu.frame_slot();
-        let found = self.sets.iter().position(|s| s.slot == slot && s.key == key);
+        let found = self
+            .sets
+            .iter()
+            .position(|s| s.slot == slot && s.key == key);
         let index = match found {
             Some(index) => index,
             None => {
@@ -288,7 +297,8 @@ impl FrameCache {
     /// Views of the current set, for the frame to add to.
     pub(super) fn take_views(&mut self, _gpu: &Gpu, _plan: &Plan) -> Views {
         let set = self.current.map(|index| &mut self.sets[index]);
-        set.map(|set| std::mem::take(&mut set.views)).unwrap_or_default()
+        set.map(|set| std::mem::take(&mut set.views))
+            .unwrap_or_default()
     }
 
     /// Keeps views of transients; those of host and history images end with the frame, since their
@@ -334,7 +344,9 @@ fn fill(gpu: &mut Gpu, plan: &Plan, set: &mut TransientSet) -> Result<(), GpuErr
                 set.images[index] = gpu.create_placed_image(name, &info, block, place.offset)?;
             }
             ResourceShape::Buffer { desc, usage } => {
-                let info = vk::BufferCreateInfo::default().size(desc.size).usage(*usage);
+                let info = vk::BufferCreateInfo::default()
+                    .size(desc.size)
+                    .usage(*usage);
                 set.buffers[index] = gpu.create_placed_buffer(name, &info, block, place.offset)?;
             }
         }

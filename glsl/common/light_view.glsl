@@ -20,15 +20,12 @@ struct LightView {
 // Map coordinates (0 to 1, y down) in xy, stored depth in z; outside 0 to 1 where q is not in view.
 vec3 light_view_project(LightView view, vec3 q) {
     vec3 v = vec3(dot(q, view.right.xyz), dot(q, view.up.xyz), dot(q, view.forward.xyz));
-    if (view.forward.w > 0.0) {
-        if (v.z <= 0.0) {
-            return vec3(-1.0);
-        }
-        float w = 1.0 / v.z;
-        return vec3((v.xy * w - vec2(view.right.w, view.up.w)) * view.scale.xy, view.scale.z * w);
-    }
-    return vec3((v.xy - vec2(view.right.w, view.up.w)) * view.scale.xy,
-        view.scale.z * v.z + view.scale.w);
+    vec2 corner = vec2(view.right.w, view.up.w);
+    bool perspective = view.forward.w > 0.0;
+    float w = perspective ? 1.0 / v.z : 1.0;
+    float depth = perspective ? view.scale.z * w : view.scale.z * v.z + view.scale.w;
+    vec3 map = vec3((v.xy * w - corner) * view.scale.xy, depth);
+    return perspective && v.z <= 0.0 ? vec3(-1.0) : map;
 }
 
 // Depth that the map holds at map coordinates m if the plane through q with unit normal n is there:
@@ -38,13 +35,11 @@ vec3 light_view_plane(LightView view, vec3 q, vec3 n, vec2 m) {
     vec2 corner = vec2(view.right.w, view.up.w);
     vec3 slopes = vec3(dot(n, view.right.xyz), dot(n, view.up.xyz), dot(n, view.forward.xyz));
     vec2 at = m / view.scale.xy + corner;
-    if (view.forward.w > 0.0) {
-        float k = view.scale.z / dot(n, q);
-        return k * vec3(slopes.x * at.x + slopes.y * at.y + slopes.z, slopes.xy / view.scale.xy);
-    }
-    float k = view.scale.z / slopes.z;
-    float z = k * (dot(n, q) - slopes.x * at.x - slopes.y * at.y) + view.scale.w;
-    return vec3(z, -k * slopes.xy / view.scale.xy);
+    float across = slopes.x * at.x + slopes.y * at.y;
+    bool perspective = view.forward.w > 0.0;
+    float k = view.scale.z / (perspective ? dot(n, q) : slopes.z);
+    float depth = perspective ? k * (across + slopes.z) : k * (dot(n, q) - across) + view.scale.w;
+    return vec3(depth, (perspective ? k : -k) * slopes.xy / view.scale.xy);
 }
 
 #endif

@@ -56,24 +56,20 @@ uint test_triangle(Receiver receiver, uint triangle, float texel_m, float extent
     bool ahead = abs(height) > POSITION_ROUNDING * extent_m
         && (height > 0.0) == (climb > 0.0)
         && (receiver.sun || abs(climb) > abs(height));
-    if (!ahead) {
-        return MISSED;
-    }
     precise float u = dot(receiver.to_light, cross(c, b));
     precise float v = dot(receiver.to_light, cross(a, c));
     precise float w = dot(receiver.to_light, cross(b, a));
-    if ((u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0)) {
-        return BLOCKED;
-    }
+    bool inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
     // Width of the triangle as the light sees it: twice its area over its longest edge.
-    float inverse_length = inversesqrt(dot(receiver.to_light, receiver.to_light));
     vec3 ab = b - a;
     vec3 bc = c - b;
     vec3 ca = a - c;
-    float longest = sqrt(max(dot(ab, ab), max(dot(bc, bc), dot(ca, ca))));
-    float width = abs(dot(cross(ab, ca), receiver.to_light)) * inverse_length / longest;
+    float longest = max(dot(ab, ab), max(dot(bc, bc), dot(ca, ca)));
+    float width = abs(dot(cross(ab, ca), receiver.to_light))
+        * inversesqrt(dot(receiver.to_light, receiver.to_light) * longest);
     float distance_m = receiver.sun ? 1.0 : length(receiver.to_light - a);
-    return width < NARROW_TEXELS * texel_m * distance_m ? MISSED_NARROW : MISSED;
+    bool narrow = width < NARROW_TEXELS * texel_m * distance_m;
+    return !ahead ? MISSED : inside ? BLOCKED : narrow ? MISSED_NARROW : MISSED;
 }
 
 // Largest coordinate in play, metres: what positions are rounded by.
@@ -93,51 +89,40 @@ float hard_visibility(Receiver receiver, LightView view, uint index, vec2 map, f
     vec2 first = floor(place);
     vec2 middle = (first + 1.0) / size_texels; // between the four, so that rounding cannot matter
     uvec4 ids = gather_map_ids(middle, index);
-    bvec4 strange = bvec4(uvec4(notEqual(ids, uvec4(0u))) & uvec4(notEqual(ids, uvec4(receiver.id))));
-    if (!any(strange)) {
-        return 1.0;
-    }
-
+    uvec4 strange = ids * uvec4(notEqual(ids, uvec4(receiver.id)));
+    bool all_strange = all(notEqual(strange, uvec4(0u)));
     float extent_m = largest_coordinate(receiver);
     float texel_m = max(abs(1.0 / view.scale.x), abs(1.0 / view.scale.y)) / size_texels;
+
+    // Mostly there is nothing to test, and sometimes more than one triangle.
     uint result = MISSED;
-    if (strange.w) {
-        result = test_triangle(receiver, ids.w - 1u, texel_m, extent_m);
-    }
-    if (strange.z && result != BLOCKED && ids.z != ids.w) {
-        result = max(result, test_triangle(receiver, ids.z - 1u, texel_m, extent_m));
-    }
-    if (strange.y && result != BLOCKED && ids.y != ids.z && ids.y != ids.w) {
-        result = max(result, test_triangle(receiver, ids.y - 1u, texel_m, extent_m));
-    }
-    if (strange.x && result != BLOCKED && ids.x != ids.y && ids.x != ids.w && ids.x != ids.z) {
-        result = max(result, test_triangle(receiver, ids.x - 1u, texel_m, extent_m));
-    }
-    if (result == BLOCKED) {
-        return 0.0;
-    }
-    if (result == MISSED && !all(strange)) {
-        return 1.0;
+    while (any(notEqual(strange, uvec4(0u)))) {
+        uint id = max(max(strange.x, strange.y), max(strange.z, strange.w));
+        strange *= uvec4(notEqual(strange, uvec4(id)));
+        result = max(result, test_triangle(receiver, id - 1u, texel_m, extent_m));
+        strange *= result == BLOCKED ? 0u : 1u;
     }
 
     // No stored triangle is hit, but a narrow one may hide between the texels. Where all four saw
     // something in front, so would the receiver's own place: an edge that leaves it free leaves one
     // of them free.
-    vec3 q = receiver.sun ? receiver.position : -receiver.to_light;
-    vec3 plane = light_view_plane(view, q, receiver.normal, (first + 0.5) / size_texels);
-    vec2 slope = plane.yz / size_texels;
-    vec4 expected = plane.x + slope.x * GATHER_X + slope.y * GATHER_Y;
-    float slack = (abs(slope.x) + abs(slope.y)) * SNAP_TEXELS + abs(plane.x) * DEPTH_ROUNDING;
-    vec4 depths = gather_map_depths(middle, index);
-    bvec4 in_front = greaterThan(depths, expected + slack);
-    if (all(in_front)) {
-        return 0.0;
+    float visibility = result == BLOCKED ? 0.0 : 1.0;
+    bool undecided = result == MISSED_NARROW || (result == MISSED && all_strange);
+    if (undecided) {
+        vec3 q = receiver.sun ? receiver.position : -receiver.to_light;
+        vec3 plane = light_view_plane(view, q, receiver.normal, (first + 0.5) / size_texels);
+        vec2 slope = plane.yz / size_texels;
+        vec4 expected = plane.x + slope.x * GATHER_X + slope.y * GATHER_Y;
+        float slack = (abs(slope.x) + abs(slope.y)) * SNAP_TEXELS + abs(plane.x) * DEPTH_ROUNDING;
+        bvec4 in_front = greaterThan(gather_map_depths(middle, index), expected + slack);
+        vec2 nearer = step(vec2(0.5), place - first);
+        bool nearest_in_front = nearer.y > 0.5
+            ? (nearer.x > 0.5 ? in_front.y : in_front.x)
+            : (nearer.x > 0.5 ? in_front.z : in_front.w);
+        bool hidden = all(in_front) || (result == MISSED_NARROW && nearest_in_front);
+        visibility = hidden ? 0.0 : 1.0;
     }
-    vec2 nearer = step(vec2(0.5), place - first);
-    bool nearest_in_front = nearer.y > 0.5
-        ? (nearer.x > 0.5 ? in_front.y : in_front.x)
-        : (nearer.x > 0.5 ? in_front.z : in_front.w);
-    return result == MISSED_NARROW && nearest_in_front ? 0.0 : 1.0;
+    return visibility;
 }
 
 #endif

@@ -35,31 +35,34 @@ vec4 fetch_triangle_texel(uint texel) {
 
 float pixel_visibility(uvec2 pixel) {
     float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
-    if (depth <= 0.0) {
-        return 1.0;
-    }
     vec3 n = unpack_unit(texelFetch(geometric_normal, ivec2(pixel), 0).x);
     vec3 p = params.camera.eye.xyz + depth * pixel_ray(params.camera, pixel);
     bool sun = params.light.w == 0.0;
     vec3 to_light = sun ? params.light.xyz : params.light.xyz - p;
-    // On or below the receiver's tangent plane the light's centre is hidden.
-    if (dot(n, to_light) <= 0.0) {
-        return 0.0;
-    }
-    Receiver receiver = Receiver(p, n, to_light, sun, texelFetch(ids, ivec2(pixel), 0).x);
     vec3 q = sun ? p : -to_light;
-    // Only the search for the view is a loop: what follows it is long.
-    uint found = 0u;
-    vec3 at = light_view_project(params.views[0], q);
-    while (found + 1u < params.counts.x && any(notEqual(at.xy, clamp(at.xy, 0.0, 1.0)))) {
-        found += 1u;
-        at = light_view_project(params.views[found], q);
+    // On or below the receiver's tangent plane the light's centre is hidden.
+    bool hit = depth > 0.0;
+    bool facing = dot(n, to_light) > 0.0;
+    float visibility = hit && !facing ? 0.0 : 1.0;
+    // Where no view looks, nothing that could block stands.
+    bool undecided = hit && facing && params.counts.x > 0u;
+    if (undecided) {
+        // Most lights have one view. Only the others pay for an index that differs between pixels.
+        uint found = 0u;
+        LightView view = params.views[0];
+        vec3 at = light_view_project(view, q);
+        while (found + 1u < params.counts.x && any(notEqual(at.xy, clamp(at.xy, 0.0, 1.0)))) {
+            found += 1u;
+            view = params.views[found];
+            at = light_view_project(view, q);
+        }
+        if (all(equal(at.xy, clamp(at.xy, 0.0, 1.0)))) {
+            uint id = texelFetch(ids, ivec2(pixel), 0).x;
+            Receiver receiver = Receiver(p, n, to_light, sun, id);
+            visibility = hard_visibility(receiver, view, found, at.xy, float(params.counts.y));
+        }
     }
-    if (params.counts.x == 0u || any(notEqual(at.xy, clamp(at.xy, 0.0, 1.0)))) {
-        // No view looks there: nothing that could block stands there.
-        return 1.0;
-    }
-    return hard_visibility(receiver, params.views[found], found, at.xy, float(params.counts.y));
+    return visibility;
 }
 
 void main() {

@@ -2,10 +2,12 @@
 
 mod support;
 
-#[path = "support/random_graph.rs"]
-mod random_graph;
+#[path = "gpu_graph/data.rs"]
+mod data;
 #[path = "gpu_graph/imports.rs"]
 mod imports;
+#[path = "support/random_graph.rs"]
+mod random_graph;
 #[path = "gpu_graph/shaders.rs"]
 mod shaders;
 #[path = "gpu_graph/work.rs"]
@@ -15,8 +17,8 @@ use antumbra::ash::vk;
 use antumbra::gpu::{Gpu, GpuError};
 use antumbra::graph::simulate::simulate;
 use antumbra::graph::{
-    BufferState, FrameCache, Graph, HistoryStates, ImageDesc, ImageState, PassBuilder, PassKind,
-    PlanResource, ResourceOrigin,
+    Barrier, BufferState, FakeMemory, FrameCache, Graph, HistoryStates, ImageDesc, ImageState,
+    PassBuilder, PassKind, Plan, PlanResource, ResourceOrigin,
 };
 use imports::Imports;
 use random_graph::{Limits, Recorder, Used, random_graph};
@@ -127,7 +129,8 @@ fn frames(gpu: &mut Gpu, world: &mut World, seed: u32, limits: Limits, count: us
         assert_eq!(report.passes.len(), plan.passes.len());
         assert_eq!(report.barriers, plan.barrier_count());
         assert_eq!(report.transient_bytes, plan.peak_bytes());
-        let previous = |r: &PlanResource| matches!(r.origin, ResourceOrigin::HistoryPrevious { .. });
+        let previous =
+            |r: &PlanResource| matches!(r.origin, ResourceOrigin::HistoryPrevious { .. });
         sum.frames += 1;
         sum.passes += report.passes.len();
         sum.barriers += report.barriers;
@@ -141,11 +144,42 @@ fn frames(gpu: &mut Gpu, world: &mut World, seed: u32, limits: Limits, count: us
     sum
 }
 
-fn record_all(seeds: std::ops::Range<u32>, limits: Limits) -> Sum {
+/// Plans as [`Work`] would have it recorded.
+struct Dry;
+
+impl<'f> Recorder<'f> for Dry {
+    fn recordable(&self) -> bool {
+        true
+    }
+
+    fn history(&mut self) -> Option<HistoryStates> {
+        Some(HistoryStates::new())
+    }
+}
+
+/// The first seeds whose graphs are not small: half of them many passes, half of them some with
+/// transients that share memory.
+fn seeds(limits: Limits, count: usize) -> Vec<u32> {
+    let wanted = |seed: &u32, shared: bool| {
+        let graph = random_graph(&numbers(*seed), limits, &mut Dry);
+        let compiled = graph.compile(&FakeMemory).unwrap();
+        let plan = compiled.plan();
+        let shares = plan.peak_bytes() < plan.unaliased_bytes();
+        plan.passes.len() >= if shared { 4 } else { 7 } && shares == shared
+    };
+    let of = |shared| {
+        (0..)
+            .filter(move |seed| wanted(seed, shared))
+            .take(count / 2)
+    };
+    of(false).chain(of(true)).collect()
+}
+
+fn record_all(limits: Limits, count: usize) -> Sum {
     let mut gpu = gpu();
     let mut world = World::new(&mut gpu);
     let mut sum = Sum::default();
-    for seed in seeds {
+    for seed in seeds(limits, count) {
         let of = frames(&mut gpu, &mut world, seed, limits, 3);
         sum.frames += of.frames;
         sum.passes += of.passes;
@@ -155,7 +189,7 @@ fn record_all(seeds: std::ops::Range<u32>, limits: Limits) -> Sum {
         sum.continued += of.continued;
         sum.aliased += of.aliased;
     }
-    println!("{}: {sum:?}", gpu.info().driver_name);
+    println!("{count} graphs on {}: {sum:?}", gpu.info().driver_name);
     world.destroy(&mut gpu);
     destroy_clean(gpu);
     sum
@@ -171,9 +205,12 @@ const CLOSED: Limits = Limits {
 #[test]
 fn random_graphs_are_recorded_without_a_message() {
     let _one = serial();
-    let sum = record_all(0..40, CLOSED);
+    let sum = record_all(CLOSED, 40);
     assert_eq!(sum.frames, 120);
-    assert!(sum.passes > 480 && sum.results > 240 && sum.aliased > 30, "{sum:?}");
+    assert!(
+        sum.passes > 600 && sum.results > 240 && sum.aliased > 50,
+        "{sum:?}"
+    );
 }
 
 #[test]
@@ -183,7 +220,79 @@ fn random_graphs_with_imports_and_history_are_recorded_without_a_message() {
         imports: true,
         ..CLOSED
     };
-    let sum = record_all(1000..1032, limits);
+    let sum = record_all(limits, 32);
     assert_eq!(sum.frames, 96);
-    assert!(sum.imports > 30 && sum.continued > 10 && sum.results > 200, "{sum:?}");
+    assert!(
+        sum.imports > 30 && sum.continued > 10 && sum.results > 200,
+        "{sum:?}"
+    );
+}
+
+/// The control of the two tests above: with one barrier gone, the simulator objects and so does the
+/// layer, but for what [`beyond_the_layer`] names.
+#[test]
+fn random_graphs_without_one_of_their_barriers_are_reported() {
+    let _one = serial();
+    let (mut spoilt, mut reported) = (0, 0);
+    for seed in seeds(CLOSED, 8) {
+        for sixth in 0..6 {
+            // The layer tells each kind of message only some times, so every mistake gets a device.
+            let mut gpu = gpu();
+            let mut world = World::new(&mut gpu);
+            world.begin_frame();
+            let (mut imports, mut cache) = (Imports::default(), FrameCache::new());
+            let mut work = Work {
+                world: &world,
+                gpu: &mut gpu,
+                imports: &mut imports,
+                history: HistoryStates::new(),
+            };
+            let graph = random_graph(&numbers(seed), CLOSED, &mut work);
+            let mut compiled = graph.compile(&gpu).unwrap();
+            let mut gone = None;
+            compiled
+                .edit_plan(|plan| gone = remove_barrier(plan, plan.barrier_count() * sixth / 6));
+            let hazards = simulate(compiled.plan());
+            assert!(!hazards.is_empty(), "graph {seed}: {}", compiled.plan());
+            gpu.run(|gpu, cmd| compiled.record(gpu, &mut cache, cmd))
+                .unwrap();
+            spoilt += 1;
+            let unseen = gpu.take_messages().is_empty();
+            reported += usize::from(!unseen);
+            assert!(
+                !unseen || gone.as_ref().is_some_and(beyond_the_layer),
+                "graph {seed}: the layer does not report that {gone:?} is missing"
+            );
+            cache.destroy(&mut gpu);
+            world.destroy(&mut gpu);
+            destroy_clean(gpu);
+        }
+    }
+    println!("{reported} of {spoilt} missing barriers were reported by the layer");
+    assert!(reported * 10 > spoilt * 9, "{reported} of {spoilt}");
+}
+
+/// Whether the layer cannot know of a missing barrier: for it an attachment drawn to twice is in
+/// order, and images that share memory do not touch each other.
+fn beyond_the_layer(barrier: &Barrier) -> bool {
+    let attachment = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT
+        | vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS
+        | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS;
+    let again = attachment.contains(barrier.src_stages | barrier.dst_stages);
+    let flush_for_images = barrier.target.is_none() && barrier.dst_access.is_empty();
+    flush_for_images || (again && barrier.transition.is_none())
+}
+
+/// Takes away the barrier of this number.
+fn remove_barrier(plan: &mut Plan, number: usize) -> Option<Barrier> {
+    let steps = plan.steps.iter_mut();
+    let batches = steps.flat_map(|step| [&mut step.hand_over, &mut step.barriers]);
+    let mut before = 0;
+    for batch in batches.chain([&mut plan.leave]) {
+        if number < before + batch.barriers.len() {
+            return Some(batch.barriers.remove(number - before));
+        }
+        before += batch.barriers.len();
+    }
+    None
 }

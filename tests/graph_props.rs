@@ -141,7 +141,7 @@ fn cells_overlap(a: Part, b: Part) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(cases(2000)))]
+    #![proptest_config(config(2000))]
 
     #[test]
     fn plans_have_no_hazard(numbers in numbers()) {
@@ -193,7 +193,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(cases(400)))]
+    #![proptest_config(config(400))]
 
     /// No barrier, and no stage or flushed access of one, can be taken away without a hazard. So
     /// every barrier is needed, and every such mistake is caught.
@@ -218,10 +218,15 @@ proptest! {
     }
 }
 
-/// `PROPTEST_CASES` overrides how many graphs are tried.
-fn cases(default: u32) -> u32 {
+/// So many random graphs, unless `PROPTEST_CASES` says otherwise. A failing graph is printed as its
+/// plan, so nothing is kept in files.
+fn config(cases: u32) -> ProptestConfig {
     let wanted = std::env::var("PROPTEST_CASES").ok();
-    wanted.and_then(|n| n.parse().ok()).unwrap_or(default)
+    ProptestConfig {
+        cases: wanted.and_then(|n| n.parse().ok()).unwrap_or(cases),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
 }
 
 /// How much the properties above cover, on graphs of a fixed seed: printed with `--nocapture`.

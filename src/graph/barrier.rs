@@ -238,7 +238,8 @@ fn touches(step: usize, visits: &mut [Vec<Vec<Visit>>]) -> Vec<Touch> {
 ///
 /// What those wrote and nobody read must not reach memory late. An image begins with a transition,
 /// to which all that is available is visible, so such writes are made available. A buffer begins
-/// with a write, so they are also made visible to the first accesses of all its cells.
+/// with a write, so they are also made visible to the first accesses of all its cells. One barrier
+/// does it for all that begin.
 fn hand_over(
     schedule: &Schedule<'_>,
     step: usize,
@@ -246,7 +247,16 @@ fn hand_over(
     cells: &mut [Vec<Cell>],
     log: &mut Log,
 ) -> Batch {
-    let mut batch = Batch::default();
+    let mut flush = Barrier {
+        target: None,
+        src_stages: vk::PipelineStageFlags2::NONE,
+        src_access: vk::AccessFlags2::NONE,
+        dst_stages: vk::PipelineStageFlags2::NONE,
+        dst_access: vk::AccessFlags2::NONE,
+        transition: None,
+    };
+    let mut image_stage = None;
+    let mut writers: Vec<&Cell> = Vec::new();
     let mut begins = Vec::new();
     for (resource, tenant, place) in schedule.placed {
         if tenant.steps.0 != step {
@@ -254,65 +264,84 @@ fn hand_over(
         }
         let firsts = first_scopes(&visits[*resource], step, tenant.image);
         let mut events = Vec::new();
-        let mut own = Barrier {
-            target: None,
-            src_stages: vk::PipelineStageFlags2::NONE,
-            src_access: vk::AccessFlags2::NONE,
-            dst_stages: vk::PipelineStageFlags2::NONE,
-            dst_access: vk::AccessFlags2::NONE,
-            transition: None,
-        };
-        let mut sources: Vec<(&Cell, Scope)> = Vec::new();
+        let mut behind_flush = false;
         for (other, owner, other_place) in schedule.placed {
             if owner.steps.1 >= step || !share_memory(place, other_place) {
                 continue;
             }
             for cell in &cells[*other] {
-                events.extend(cell.last_events());
-                let (write, hidden): (_, Vec<Scope>) = if tenant.image {
-                    (cell.unflushed(), firsts.clone())
+                let write = if tenant.image {
+                    cell.unflushed()
                 } else {
-                    let hidden = firsts.iter().filter(|first| cell.hidden(first).is_some());
-                    (firsts.iter().find_map(|first| cell.hidden(first)), hidden.copied().collect())
+                    firsts.iter().find_map(|first| cell.hidden(first))
                 };
                 let Some(write) = write else {
+                    events.extend(cell.last_events());
                     continue;
                 };
-                let done = batch.barriers.iter().find(|b| flushes(b, &write, &hidden));
-                if let Some(done) = done {
-                    events.push(Event::by_barrier(done.dst_stages, log.now() + 1));
-                    continue;
+                behind_flush = true;
+                writers.push(cell);
+                flush.src_stages |= write.stages;
+                flush.src_access |= write.access;
+                if tenant.image {
+                    image_stage = image_stage.or(firsts.first().map(|first| first.stages));
+                } else {
+                    for first in firsts.iter().filter(|f| cell.hidden(f).is_some()) {
+                        flush.dst_stages |= first.stages;
+                        flush.dst_access |= first.access;
+                    }
                 }
-                own.src_stages |= write.stages;
-                for first in &hidden {
-                    own.dst_stages |= first.stages;
-                    own.dst_access |= first.access;
-                }
-                sources.push((cell, write));
             }
         }
-        for (cell, write) in &sources {
-            if !cell.is_available(log, own.src_stages) {
-                own.src_access |= write.access;
-            }
-        }
-        if !sources.is_empty() {
-            batch.barriers.push(own);
-            events.push(Event::by_barrier(own.dst_stages, log.now() + 1));
-        }
-        begins.push((*resource, events));
+        begins.push((*resource, events, behind_flush));
     }
-    if !batch.barriers.is_empty() {
-        for barrier in &batch.barriers {
-            let all = cells.iter_mut().flatten();
-            all.for_each(|cell| cell.cross(log, barrier));
+    let mut batch = Batch::default();
+    if !writers.is_empty() {
+        if flush.dst_stages.is_empty() {
+            flush.dst_stages = image_stage.unwrap_or_default();
         }
+        flush = with_least_source(flush, &writers, log);
+        for (_, events, behind_flush) in &mut begins {
+            if *behind_flush {
+                events.push(Event::by_barrier(flush.dst_stages, log.now() + 1));
+            }
+        }
+        let all = cells.iter_mut().flatten();
+        all.for_each(|cell| cell.cross(log, &flush));
+        batch.barriers.push(flush);
         log.push(&batch.barriers);
     }
-    for (resource, events) in begins {
+    for (resource, events, _) in begins {
         cells[resource].fill(Cell::fresh(events));
     }
     batch
+}
+
+/// Drops source stages and accesses that the barrier does without, thanks to others before it.
+fn with_least_source(mut barrier: Barrier, writers: &[&Cell], log: &Log) -> Barrier {
+    let reaches = |barrier: &Barrier| writers.iter().all(|cell| cell.reaches(log, barrier));
+    for bit in super::access::stage_bits(barrier.src_stages) {
+        let fewer = Barrier {
+            src_stages: barrier.src_stages & !bit,
+            ..barrier
+        };
+        if reaches(&fewer) {
+            barrier = fewer;
+        }
+    }
+    let mut accesses = barrier.src_access.as_raw();
+    while accesses != 0 {
+        let bit = accesses & accesses.wrapping_neg();
+        accesses ^= bit;
+        let fewer = Barrier {
+            src_access: barrier.src_access & !vk::AccessFlags2::from_raw(bit),
+            ..barrier
+        };
+        if reaches(&fewer) {
+            barrier = fewer;
+        }
+    }
+    barrier
 }
 
 /// What the writes of former owners of its memory must be visible to when a transient begins.
@@ -338,17 +367,6 @@ fn first_scopes(visits: &[Vec<Visit>], step: usize, image: bool) -> Vec<Scope> {
         }
     }
     scopes
-}
-
-/// Whether a global barrier makes this write available, and visible to these accesses.
-fn flushes(barrier: &Barrier, write: &Scope, readers: &[Scope]) -> bool {
-    barrier.src_stages.contains(write.stages)
-        && barrier.src_access.contains(write.access)
-        && readers.iter().all(|reader| {
-            reader.access.is_empty()
-                || barrier.dst_stages.contains(reader.stages)
-                    && barrier.dst_access.contains(reader.access)
-        })
 }
 
 /// Whether two placements share a byte.
@@ -396,13 +414,15 @@ fn propose(
             continue;
         };
         let part = part_of(touch);
-        let joined = runs.last_mut().and_then(|(last, resource, so_far, members)| {
-            let same = *last == barrier && *resource == touch.resource;
-            let whole = same.then(|| join(*so_far, part)).flatten()?;
-            *so_far = whole;
-            members.push(index);
-            Some(())
-        });
+        let joined = runs
+            .last_mut()
+            .and_then(|(last, resource, so_far, members)| {
+                let same = *last == barrier && *resource == touch.resource;
+                let whole = same.then(|| join(*so_far, part)).flatten()?;
+                *so_far = whole;
+                members.push(index);
+                Some(())
+            });
         if joined.is_none() {
             runs.push((barrier, touch.resource, part, vec![index]));
         }
@@ -433,7 +453,9 @@ fn propose(
 
 /// Takes out stage bits, then whole barriers, that the rest of the batch makes redundant.
 fn minimise(touches: &mut [Touch], cells: &[Vec<Cell>], log: &Log, barriers: &mut Vec<Barrier>) {
-    let wanting: Vec<usize> = (0..touches.len()).filter(|t| touches[*t].own.is_some()).collect();
+    let wanting: Vec<usize> = (0..touches.len())
+        .filter(|t| touches[*t].own.is_some())
+        .collect();
     let allowed = |touches: &[Touch], barriers: &[Barrier], gone: Option<usize>| {
         wanting.iter().all(|touch| {
             let touch = &touches[*touch];

@@ -172,7 +172,10 @@ impl Write {
     fn is_visible(&self, scope: &Scope) -> bool {
         let wanted = expand_access(scope.access);
         stage_bits(expand_stages(scope.stages)).all(|bit| {
-            let rows = self.visible.iter().filter(|(stages, _)| stages.contains(bit));
+            let rows = self
+                .visible
+                .iter()
+                .filter(|(stages, _)| stages.contains(bit));
             rows.fold(Access::empty(), |all, (_, access)| all | *access)
                 .contains(wanted)
         })
@@ -205,7 +208,9 @@ pub(crate) struct Need {
 
 impl Need {
     fn stages(&self) -> Stages {
-        self.now.iter().fold(Stages::empty(), |all, s| all | s.stages)
+        self.now
+            .iter()
+            .fold(Stages::empty(), |all, s| all | s.stages)
     }
 
     fn scopes(&self) -> impl Iterator<Item = &Scope> {
@@ -290,9 +295,11 @@ impl Cell {
         })
     }
 
-    /// Whether the last write is available to a barrier with these source stages.
-    pub fn is_available(&self, log: &Log, src: Stages) -> bool {
-        self.write.as_ref().is_none_or(|write| write.is_available(log, src))
+    /// Whether the last write is available to what a barrier makes of it.
+    pub fn reaches(&self, log: &Log, barrier: &Barrier) -> bool {
+        self.write.as_ref().is_none_or(|write| {
+            write.is_flushed_by(barrier) || write.is_available(log, barrier.src_stages)
+        })
     }
 
     /// Whether a step may do this behind `batch`, of which `own` covers this cell.
@@ -313,7 +320,11 @@ impl Cell {
             }
         }
         let stages = expand_stages(need.stages());
-        !need.writes || self.reads.iter().all(|read| read.before(log, batch, stages))
+        !need.writes
+            || self
+                .reads
+                .iter()
+                .all(|read| read.before(log, batch, stages))
     }
 
     fn allows_transition(&self, need: &Need, log: &Log, own: &Barrier) -> bool {
@@ -348,7 +359,11 @@ impl Cell {
         let transition = self.layout != need.layout;
         if transition {
             barrier.transition = Some(Transition {
-                old: if need.keeps { self.layout } else { ImageLayout::UNDEFINED },
+                old: if need.keeps {
+                    self.layout
+                } else {
+                    ImageLayout::UNDEFINED
+                },
                 new: need.layout,
             });
         }
@@ -406,7 +421,10 @@ impl Cell {
     pub fn access(&mut self, need: &Need, log: &Log) {
         let event = Event::new(need.stages(), log.now());
         if need.writes {
-            let access = need.now.iter().fold(Access::empty(), |all, s| all | s.access);
+            let access = need
+                .now
+                .iter()
+                .fold(Access::empty(), |all, s| all | s.access);
             self.reads.clear();
             self.write = Some(Write {
                 event,

@@ -1,5 +1,7 @@
 //! Random graphs, decoded from a string of numbers so that a failing one shrinks.
 
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
 use antumbra::ash::vk::{self, Handle};
 use antumbra::graph::{
     Access, BufferDesc, BufferId, BufferPart, BufferState, Graph, HistoryState, HistoryStates,
@@ -155,14 +157,12 @@ pub trait Recorder<'f> {
 }
 
 /// A recorder that records nothing.
-#[allow(dead_code)]
 pub struct Nothing;
 
 impl<'f> Recorder<'f> for Nothing {}
 
 /// One declared use, for recorders. The tag is the number of the image or buffer; a history image
 /// has one for both its versions. Recorders that record nothing read none of it.
-#[allow(dead_code)]
 #[derive(Clone, Copy, Debug)]
 pub enum Used {
     Image {
@@ -393,14 +393,20 @@ fn image_part(c: &mut Choices<'_>, desc: &ImageDesc) -> ImagePart {
 fn cells(desc: &ImageDesc, part: &ImagePart) -> Vec<usize> {
     let mips = part.base_mip..part.base_mip + part.mips;
     let layers = part.base_layer..part.base_layer + part.layers;
-    mips.flat_map(|mip| layers.clone().map(move |l| (mip * desc.layers + l) as usize))
-        .collect()
+    mips.flat_map(|mip| {
+        layers
+            .clone()
+            .map(move |l| (mip * desc.layers + l) as usize)
+    })
+    .collect()
 }
 
 fn touches(uses: &[Used], id: ImageId, part: &ImagePart, desc: &ImageDesc) -> bool {
     let mine = cells(desc, part);
     uses.iter().any(|used| match used {
-        Used::Image { id: other, part, .. } => {
+        Used::Image {
+            id: other, part, ..
+        } => {
             let theirs = cells(desc, part);
             other.same_resource(id) && theirs.iter().any(|cell| mine.contains(cell))
         }

@@ -55,7 +55,6 @@ fn one_barrier_serves_later_readers_in_other_stages() {
         let drawn = pass.color(drawn, Load::Discard);
         pass.read(image, Access::Sampled(Stage::Fragment));
         pass.read(first, Access::Sampled(Stage::Vertex));
-        drop(pass);
         g.keep(drawn);
     });
     let barriers = before(&plan, "first", "image");
@@ -134,7 +133,6 @@ fn a_transition_and_a_flush_are_one_barrier() {
         let image = g.create_image("image", desc());
         let mut pass = g.pass("draw", PassKind::Graphics);
         let image = pass.color(image, Load::Clear([0.0; 4]));
-        drop(pass);
         consume(g, "read", image);
     });
     let barriers = before(&plan, "read", "image");
@@ -370,7 +368,6 @@ fn depth_waits_for_both_of_its_test_stages() {
         let map = g.create_image("map", ImageDesc::new(vk::Format::D32_SFLOAT, 16, 16));
         let mut pass = g.pass("draw", PassKind::Graphics);
         let map = pass.depth(map, Load::Clear([1.0; 4]));
-        drop(pass);
         consume(g, "read", map);
     });
     let tests = S::EARLY_FRAGMENT_TESTS | S::LATE_FRAGMENT_TESTS;
@@ -388,12 +385,10 @@ fn depth_can_be_tested_and_sampled_at_once() {
         let color = g.create_image("color", desc());
         let mut pass = g.pass("first", PassKind::Graphics);
         let depth = pass.depth(depth, Load::Clear([1.0; 4]));
-        drop(pass);
         let mut pass = g.pass("second", PassKind::Graphics);
         let color = pass.color(color, Load::Discard);
         pass.depth_test(depth);
         pass.read(depth, Access::Sampled(Stage::Fragment));
-        drop(pass);
         g.keep(color);
     });
     let barriers = before(&plan, "second", "depth");

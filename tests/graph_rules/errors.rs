@@ -411,7 +411,6 @@ fn attachments_of_different_sizes() {
             let mut pass = g.pass("draw", PassKind::Graphics);
             let color = pass.color_part(color, ImagePart::mip(1), Load::Discard);
             let depth = pass.depth(depth, Load::Discard);
-            drop(pass);
             g.keep(color);
             g.keep(depth);
         },

@@ -29,7 +29,6 @@ fn passes_that_nobody_needs_are_culled_in_a_chain() {
         let b = pass.overwrite(b, WRITE);
         let mut pass = g.pass("read b", PassKind::Compute);
         pass.read(b, SAMPLED);
-        drop(pass);
         let c = g.create_image("c", desc());
         let c = make(g, "make c", c);
         g.keep(c);
@@ -98,7 +97,6 @@ fn an_image_cleared_by_its_last_pass_keeps_nothing_before() {
         let image = make(g, "lost", image);
         let mut pass = g.pass("draw", PassKind::Graphics);
         let image = pass.color(image, Load::Clear([1.0; 4]));
-        drop(pass);
         g.keep(image);
     });
     assert_eq!(running(&plan), ["draw"]);

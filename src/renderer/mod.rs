@@ -14,6 +14,7 @@ mod camera;
 mod draw;
 mod gbuffer;
 mod scene_buffers;
+mod scene_layout;
 mod shade;
 mod visible;
 

@@ -6,6 +6,8 @@ mod support;
 mod data;
 #[path = "gpu_graph/imports.rs"]
 mod imports;
+#[path = "gpu_graph/layer.rs"]
+mod layer;
 #[path = "support/random_graph.rs"]
 mod random_graph;
 #[path = "gpu_graph/shaders.rs"]
@@ -21,6 +23,7 @@ use antumbra::graph::{
     PassBuilder, PassKind, Plan, PlanResource, ResourceOrigin,
 };
 use imports::Imports;
+use layer::assert_current_layer;
 use random_graph::{Limits, Recorder, Used, random_graph};
 use support::{assert_no_messages, destroy_clean, gpu, serial};
 use work::World;
@@ -176,6 +179,7 @@ fn seeds(limits: Limits, count: usize) -> Vec<u32> {
 }
 
 fn record_all(limits: Limits, count: usize) -> Sum {
+    assert_current_layer();
     let mut gpu = gpu();
     let mut world = World::new(&mut gpu);
     let mut sum = Sum::default();
@@ -233,6 +237,7 @@ fn random_graphs_with_imports_and_history_are_recorded_without_a_message() {
 #[test]
 fn random_graphs_without_one_of_their_barriers_are_reported() {
     let _one = serial();
+    assert_current_layer();
     let (mut spoilt, mut reported) = (0, 0);
     for seed in seeds(CLOSED, 8) {
         for sixth in 0..6 {

@@ -3,6 +3,8 @@
 
 mod support;
 
+#[path = "gpu_graph/layer.rs"]
+mod layer;
 #[path = "support/random_graph.rs"]
 mod random_graph;
 #[path = "gpu_graph/scene.rs"]

@@ -107,7 +107,8 @@ impl<'f> PassBuilder<'_, 'f> {
         self.use_resource(id, None, access, Mode::Read);
     }
 
-    /// Reads a part of a resource.
+    /// Reads a part of a resource. Name what the commands read and no more: the rest would wait for
+    /// its writers, and its next writer for this pass, for nothing.
     pub fn read_part<R: ResourceId>(&mut self, id: R, part: R::Part, access: Access) {
         self.use_resource(id, Some(part.into()), access, Mode::Read);
     }

@@ -11,6 +11,7 @@ use antumbra::graph::{
     ImageDesc, ImageId, ImagePart, Load, PassKind, Stage,
 };
 
+use crate::layer::assert_current_layer;
 use crate::support::{assert_no_messages, compile, destroy_clean, gpu, serial};
 
 const SIDE: u32 = 32;
@@ -318,6 +319,7 @@ fn expected(input: &[f32]) -> Vec<f32> {
 #[test]
 fn sharing_memory_changes_no_byte() {
     let _one = serial();
+    assert_current_layer();
     let mut gpu = gpu();
     let shaders = Shaders::new();
     let mut input = host_buffer(&mut gpu, "input", BYTES, MemoryLocation::CpuToGpu);
@@ -364,6 +366,7 @@ fn sharing_memory_changes_no_byte() {
 #[test]
 fn history_carries_over_from_frame_to_frame() {
     let _one = serial();
+    assert_current_layer();
     let mut gpu = gpu();
     let shaders = Shaders::new();
     let output = host_buffer(&mut gpu, "output", BYTES, MemoryLocation::GpuToCpu);
@@ -421,6 +424,7 @@ fn history_carries_over_from_frame_to_frame() {
 #[test]
 fn a_pass_is_refused_what_it_did_not_declare() {
     let _one = serial();
+    assert_current_layer();
     let mut gpu = gpu();
     let shaders = Shaders::new();
     let mut cache = FrameCache::new();

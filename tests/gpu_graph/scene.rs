@@ -1,6 +1,6 @@
 //! Small graphs that do real work, recorded as planned and then with a mistake in their plan.
 
-use antumbra::ash::{self, vk};
+use antumbra::ash::vk;
 use antumbra::gpu::{Gpu, GpuError};
 use antumbra::graph::simulate::{Problem, simulate};
 use antumbra::graph::{
@@ -8,6 +8,7 @@ use antumbra::graph::{
     ImageId, ImagePart, Load, PassKind, Plan, Stage,
 };
 
+use crate::layer::assert_current_layer;
 use crate::random_graph::{Used, texel};
 use crate::support::{assert_no_messages, destroy_clean, gpu, serial};
 use crate::work::World;
@@ -148,30 +149,6 @@ fn record(
     cache.destroy(gpu);
     let messages = gpu.take_messages().into_iter().map(|message| message.id);
     (hazards, messages.collect())
-}
-
-/// The layer's version must be one that sees hazards on attachments.
-#[track_caller]
-fn assert_current_layer() {
-    // SAFETY: the loader was loaded before, by the device under test.
-    let layers = unsafe {
-        let entry = ash::Entry::load().unwrap();
-        entry.enumerate_instance_layer_properties().unwrap()
-    };
-    let layer = layers
-        .iter()
-        .find(|layer| layer.layer_name_as_c_str() == Ok(c"VK_LAYER_KHRONOS_validation"))
-        .expect("the validation layer: apt install vulkan-validationlayers");
-    let version = layer.spec_version;
-    let (major, minor) = (
-        vk::api_version_major(version),
-        vk::api_version_minor(version),
-    );
-    assert!(
-        (major, minor) >= (1, 4),
-        "the validation layer is of Vulkan {major}.{minor} and too old to see hazards on \
-         attachments: run scripts/setup.sh, which fetches a current one to .deps/vulkan/validation"
-    );
 }
 
 /// Records the scene as it was planned, which must be silent, and then with the mistake, which

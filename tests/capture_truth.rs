@@ -130,7 +130,7 @@ fn hard_shadows_are_where_they_belong() {
     ] {
         let wrong = wrong_part(name);
         assert!(
-            wrong <= 0.005,
+            wrong <= 0.001,
             "{name}: {:.3} % of the pixels are wrong",
             100.0 * wrong
         );

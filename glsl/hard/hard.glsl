@@ -17,10 +17,11 @@
 vec4 gather_map_depths(vec2 place, uint view);
 uvec4 gather_map_ids(vec2 place, uint view); // triangle numbers plus one, 0 for none
 
-// What rasterisation may be off by. Vertices snap to 1/256 texel, which shifts a plane's depth by up
-// to that part of its slope; four times that covers interpolation over the largest triangle. Depths
-// themselves are rounded to 2^-24. Larger values detach shadows, smaller ones leave dark specks.
-const float SNAP_TEXELS = 1.0 / 64.0;
+// What rasterisation may be off by. Vertices snap to the device's sub-texel grid (256 or 16 steps),
+// which shifts a plane's depth by up to one step of its slope; four steps cover interpolation over
+// the largest triangle. Depths themselves are rounded to 2^-24. Larger values detach shadows, smaller
+// ones leave dark specks.
+layout(constant_id = 0) const float SNAP_TEXELS = 4.0 / 256.0;
 const float DEPTH_ROUNDING = 1.0 / 1048576.0;
 
 // Rounding of positions, as a part of the largest coordinate: a few units of the last place. A

@@ -110,7 +110,14 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
             Bind::sampled(6, ids, nearest),
             Bind::storage_image(7, visibility),
         ];
-        ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
+        // Four steps of the grid that vertices snap to: SNAP_TEXELS in hard.glsl.
+        let steps = ctx.gpu().info().limits.sub_pixel_precision_bits.min(16);
+        let snap = 4.0 / (1u32 << steps) as f32;
+        let pipeline = ComputePipelineDesc {
+            constants: vec![(0, snap.to_bits())],
+            ..ComputePipelineDesc::new(shader)
+        };
+        ctx.bind_compute(&pipeline, &bindings, &[])?;
         ctx.dispatch(shader.groups([width, height, 1]));
         Ok(())
     });

@@ -12,11 +12,12 @@ mod camera;
 mod error;
 #[cfg(feature = "cli")]
 mod gltf;
+mod material;
 mod select;
 
 use std::path::PathBuf;
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3};
 
 use crate::light::AreaLight;
 use error::shorten;
@@ -25,7 +26,8 @@ pub use bounds::Aabb;
 pub use camera::{Ray, SceneCamera};
 pub use error::SceneError;
 #[cfg(feature = "cli")]
-pub use gltf::LoadOptions;
+pub use gltf::{LoadOptions, SceneFile};
+pub use material::{AlphaMode, Material, Texture, TextureImage, Wrap};
 
 /// Largest magnitude of a coordinate in scene space, metres. Products of four such numbers, as in
 /// determinants, stay within `f32`.
@@ -44,6 +46,8 @@ pub struct Scene {
     pub primitives: Vec<Primitive>,
     /// Surfaces.
     pub materials: Vec<Material>,
+    /// Images of surfaces; each [`Texture::image`] is an index into them.
+    pub images: Vec<TextureImage>,
     /// Perspective cameras in document order.
     pub cameras: Vec<SceneCamera>,
     /// Lights in document order.
@@ -67,6 +71,9 @@ pub struct Primitive {
     pub positions: Vec<Vec3>,
     /// Unit shading normals, one for each position. The geometric normal is the triangle's own.
     pub normals: Vec<Vec3>,
+    /// Where each position lies in the material's base texture: (0, 0) is the image's top left
+    /// corner, (1, 1) its bottom right one. One for each position, or none at all.
+    pub uvs: Vec<Vec2>,
     /// Three for each triangle, each an index into `positions`; counter-clockwise seen from the
     /// front.
     pub indices: Vec<u32>,
@@ -76,46 +83,6 @@ impl Primitive {
     /// Number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.indices.len() / 3
-    }
-}
-
-/// How the alpha of a surface counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum AlphaMode {
-    /// Ignored: the surface is solid.
-    #[default]
-    Opaque,
-    /// Below `cutoff` the surface has a hole, to light as well.
-    Mask {
-        /// 0 or more.
-        cutoff: f32,
-    },
-    /// See-through in the picture; solid to light.
-    Blend,
-}
-
-/// A surface.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Material {
-    /// For messages; may be empty.
-    pub name: String,
-    /// Linear RGB and alpha, each 0 to 1.
-    pub base_color: Vec4,
-    /// Shaded on both sides. Light is blocked from both sides in any case.
-    pub double_sided: bool,
-    /// How alpha counts.
-    pub alpha_mode: AlphaMode,
-}
-
-impl Default for Material {
-    /// White, opaque, single-sided: glTF's material for primitives that name none.
-    fn default() -> Self {
-        Self {
-            name: String::new(),
-            base_color: Vec4::ONE,
-            double_sided: false,
-            alpha_mode: AlphaMode::Opaque,
-        }
     }
 }
 
@@ -193,6 +160,11 @@ impl Scene {
                 );
                 return Err(invalid(element(), reason));
             }
+            let uvs = primitive.uvs.len();
+            if uvs != 0 && uvs != vertices {
+                let reason = format!("it has {vertices} positions and {uvs} texture coordinates");
+                return Err(invalid(element(), reason));
+            }
             for (vertex, position) in primitive.positions.iter().enumerate() {
                 // Written so that NaN fails.
                 if !(position.abs().max_element() <= MAX_COORDINATE && position.is_finite()) {
@@ -217,17 +189,23 @@ impl Scene {
             }
         }
         for (i, material) in self.materials.iter().enumerate() {
-            let colour = material.base_color;
-            let cutoff = match material.alpha_mode {
-                AlphaMode::Mask { cutoff } => cutoff,
-                AlphaMode::Opaque | AlphaMode::Blend => 0.0,
-            };
-            let unit = |c: f32| (0.0..=1.0).contains(&c);
-            let good = colour.to_array().into_iter().all(unit) && cutoff >= 0.0;
-            if !(good && cutoff.is_finite()) {
+            if let Some(reason) = self.material_fault(material) {
+                let element = format!("material {i} `{}`", shorten(&material.name));
+                return Err(invalid(element, reason));
+            }
+        }
+        for (i, image) in self.images.iter().enumerate() {
+            let texels = image.width as usize * image.height as usize;
+            if texels == 0 || texels != image.texels.len() {
+                let reason = format!(
+                    "it is {}x{} and has {} texels",
+                    image.width,
+                    image.height,
+                    image.texels.len()
+                );
                 return Err(invalid(
-                    format!("material {i} `{}`", shorten(&material.name)),
-                    format!("base colour {colour} or alpha cutoff {cutoff} is out of range"),
+                    format!("image {i} `{}`", shorten(&image.name)),
+                    reason,
                 ));
             }
         }
@@ -251,6 +229,30 @@ impl Scene {
         }
         self.bounds = bounds;
         Ok(())
+    }
+
+    fn material_fault(&self, material: &Material) -> Option<String> {
+        let unit = |c: f32| (0.0..=1.0).contains(&c);
+        let (colour, emissive) = (material.base_color, material.emissive);
+        let cutoff = material.mask_cutoff().unwrap_or(0.0);
+        if !colour.to_array().into_iter().all(unit) {
+            Some(format!("base colour {colour} is not within 0 to 1"))
+        } else if !(cutoff >= 0.0 && cutoff.is_finite()) {
+            Some(format!("alpha cutoff {cutoff} is not finite and 0 or more"))
+        } else if !(unit(material.metallic) && unit(material.roughness)) {
+            Some(format!(
+                "metallic {} or roughness {} is not within 0 to 1",
+                material.metallic, material.roughness
+            ))
+        } else if !(emissive.is_finite() && emissive.min_element() >= 0.0) {
+            Some(format!(
+                "emissive colour {emissive} is not finite and 0 or more"
+            ))
+        } else {
+            let image = material.base_texture?.image;
+            (image >= self.images.len())
+                .then(|| format!("it names image {image}, which is missing"))
+        }
     }
 
     /// What messages call this scene: its file, else its name.

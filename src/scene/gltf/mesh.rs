@@ -199,6 +199,7 @@ impl LocalPrimitive {
                 .collect(),
             normals,
             indices,
+            uvs: Vec::new(),
         }
     }
 }

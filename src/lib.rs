@@ -1,7 +1,7 @@
 //! Area-light soft shadows for Vulkan.
 //!
-//! A frame is a [`graph`] of passes: [`renderer`] declares those that every frame has, [`shadow`]
-//! those of the shadow technique, and the graph plans and records them on a [`gpu::Gpu`], whether
+//! A frame is a [`graph`] of passes: [`geometry`] declares those that find the surface at each pixel,
+//! [`shadow`] those of the shadow technique, [`renderer`] whole frames, and the graph plans and records them on a [`gpu::Gpu`], whether
 //! that owns its device or was given a host's. [`scene`] and [`light`] hold what is to be seen;
 //! [`capture`] brings frames back to memory and to files.
 //!
@@ -42,6 +42,7 @@ pub use ash;
 pub mod capture;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod geometry;
 pub mod gpu;
 pub mod graph;
 pub mod light;

@@ -3,6 +3,8 @@
 //! Lengths are metres, angles radians, positions in the space of the scene that holds the light
 //! (right-handed, +Y up). A light is not geometry: it neither blocks light nor shows in the picture.
 
+mod above;
+mod irradiance;
 mod overrides;
 
 use std::f32::consts::PI;

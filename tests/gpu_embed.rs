@@ -185,7 +185,7 @@ fn a_host_records_the_same_frame() {
                 .collect();
             assert_eq!(
                 culled,
-                ["shade.base", "shade.light lamp"],
+                ["frame.params", "shade.base", "shade.light lamp"],
                 "nobody asked for the picture"
             );
             compiled.record(&mut gpu, &mut cache, cmd).unwrap();

@@ -2,12 +2,12 @@
 
 mod support;
 
+use antumbra::geometry::PixelCamera;
 use antumbra::gpu::{ComputePipelineDesc, GpuError, MemoryLocation, SetWrite};
 use antumbra::light::{AreaLight, LightShape};
-use antumbra::renderer::{LightPush, PixelCamera};
 use antumbra::scene::{Aabb, SceneCamera};
 use antumbra::shadow::hard::HardParams;
-use antumbra::shadow::{LightView, light_views};
+use antumbra::shadow::{LightParams, LightView, ViewParams, light_views, shape_number};
 use glam::{UVec2, Vec3, Vec4};
 use support::work::{COMPUTE, STORAGE, bind, full_barrier, storage};
 use support::{compile, destroy_clean, gpu, serial};
@@ -192,8 +192,107 @@ fn structs_shared_with_shaders_lie_the_same() {
         = "LightView" in "hard/visibility.comp");
     assert_layout!(HardParams { camera, light, counts, views }
         = "HardParams" in "hard/visibility.comp");
-    assert_layout!(LightPush {
-        eye, inverse_range, corner_ray, cos_inner, pixel_right, cos_outer, pixel_down, one_sided,
-        light, positional, direction, unused, intensity, unused_too,
-    } = "Push" in "shade/light.frag");
+    assert_layout!(LightParams { center, axis_x, axis_y, direction, intensity, cone }
+        = "Light" in "shade/light.frag");
+    assert_layout!(ViewParams { camera, light } = "ViewParams" in "shade/light.frag");
+}
+
+/// Lights of all shapes, seen from points and normals all round, many of whose planes cut them.
+fn light_cases() -> Vec<(AreaLight, Vec<[f32; 4]>)> {
+    let shapes = [
+        LightShape::Point,
+        LightShape::Disk { radius: 0.7 },
+        LightShape::Rect {
+            width: 1.5,
+            height: 0.4,
+        },
+        LightShape::Sphere { radius: 0.6 },
+        LightShape::Line { length: 2.0 },
+        LightShape::Sun {
+            angular_diameter: 0.3,
+        },
+    ];
+    let cases = shapes.map(|shape| {
+        let center = Vec3::new(0.2, 1.0, -0.4);
+        let light = AreaLight::new(
+            shape,
+            center,
+            Vec3::new(0.3, -1.0, 0.2),
+            Vec3::new(1.0, 0.1, 0.4),
+        );
+        let rows = directions()
+            .into_iter()
+            .enumerate()
+            .flat_map(|(i, normal)| {
+                let height = 0.6 * (i % 7) as f32 / 6.0;
+                let point = Vec3::new(0.1 * (i % 11) as f32 - 0.3, height, 0.1 * (i % 5) as f32);
+                [point.extend(0.0).to_array(), normal.extend(0.0).to_array()]
+            });
+        (light, rows.collect())
+    });
+    cases.to_vec()
+}
+
+/// Runs `function(light, shape, p, n)` for each case and hands both answers to `check`.
+fn compare_light_function(
+    include: &str,
+    function: &str,
+    twin: fn(&AreaLight, Vec3, Vec3) -> f32,
+    check: fn(&AreaLight, f32, f32, Vec3, Vec3),
+) {
+    for (light, rows) in light_cases() {
+        let head = format!(
+            "#include \"{include}\"
+            layout(push_constant) uniform Push {{ Light light; }} push;"
+        );
+        let shape = shape_number(&light.shape);
+        let body = format!(
+            "vec3 n = source[(gl_WorkGroupID.x | 1u)].xyz; vec3 p = source[gl_WorkGroupID.x & ~1u].xyz;
+            r = vec4({function}(push.light, {shape}u, p, n));"
+        );
+        let params = LightParams::new(&light);
+        let results = map(&head, &body, bytemuck::bytes_of(&params), &rows);
+        for (result, rows) in results.chunks(2).zip(rows.chunks(2)) {
+            let [p, n] = [rows[0], rows[1]].map(|row| Vec3::from_slice(&row));
+            check(&light, result[0][0], twin(&light, p, n), p, n);
+        }
+    }
+}
+
+#[test]
+fn the_part_of_a_light_above_a_plane_is_the_same_in_both_languages() {
+    let _one = serial();
+    compare_light_function(
+        "common/light_above.glsl",
+        "light_above",
+        AreaLight::part_above,
+        |light, found, expected, p, n| {
+            let error = (found - expected).abs();
+            assert!(
+                error < 2.0e-5,
+                "{}: {found}, not {expected}, at {p}, {n}",
+                light.shape
+            );
+        },
+    );
+}
+
+#[test]
+fn irradiance_is_the_same_in_both_languages() {
+    let _one = serial();
+    compare_light_function(
+        "common/light_irradiance.glsl",
+        "light_irradiance",
+        AreaLight::irradiance,
+        |light, found, expected, p, n| {
+            // Drivers' inverse trigonometric functions are good to some 1e-4.
+            let facing = light.irradiance(p, (light.center - p).normalize()).max(0.1);
+            let error = (found - expected).abs() / facing;
+            assert!(
+                error < 1.0e-3,
+                "{}: {found}, not {expected}, at {p}, {n}",
+                light.shape
+            );
+        },
+    );
 }

@@ -24,8 +24,34 @@ vec3 fetch_geometric_normal(uint triangle) {
     return fetch_triangle_texel(4u * triangle + 3u).xyz;
 }
 
+// What the fourth texel holds beside the normal: a material's number, or -1 less that number where
+// the material cuts holes.
+bool material_is_masked(float stored) {
+    return stored < 0.0;
+}
+
+uint material_number(float stored) {
+    return uint(stored < 0.0 ? -1.0 - stored : stored);
+}
+
 uint fetch_material(uint triangle) {
-    return uint(fetch_triangle_texel(4u * triangle + 3u).w);
+    return material_number(fetch_triangle_texel(4u * triangle + 3u).w);
+}
+
+// Barycentric coordinates of a point in a triangle's plane, each 0 to 1, from areas along the normal.
+vec3 weights_in_triangle(vec3 p, vec3 a, vec3 b, vec3 c, vec3 normal) {
+    float weight_b = dot(cross(p - a, c - a), normal);
+    float weight_c = dot(cross(b - a, p - a), normal);
+    float area = dot(cross(b - a, c - a), normal);
+    vec2 weights = clamp(vec2(weight_b, weight_c) / max(area, 1.0e-38), 0.0, 1.0);
+    return vec3(1.0 - weights.x - weights.y, weights);
+}
+
+vec3 triangle_weights(uint triangle, vec3 p) {
+    vec3 a = fetch_corner(triangle, 0u).position;
+    vec3 b = fetch_corner(triangle, 1u).position;
+    vec3 c = fetch_corner(triangle, 2u).position;
+    return weights_in_triangle(p, a, b, c, fetch_geometric_normal(triangle));
 }
 
 ivec2 triangle_texel_place(uint texel) {

@@ -51,15 +51,11 @@ void main() {
     float near_plane = push.camera.corner_ray.w;
     depth = clamp(depth, max(nearest, near_plane), max(farthest, near_plane));
 
-    // Barycentric coordinates in the plane, from areas along the normal.
     vec3 p = push.camera.eye.xyz + depth * ray;
-    float weight_b = dot(cross(p - a.position, c.position - a.position), normal);
-    float weight_c = dot(cross(b.position - a.position, p - a.position), normal);
-    float area = dot(cross(b.position - a.position, c.position - a.position), normal);
-    vec2 weights = clamp(vec2(weight_b, weight_c) / max(area, 1.0e-38), 0.0, 1.0);
-    vec3 smooth_normal = (1.0 - weights.x - weights.y) * unit_from_octahedral(unpack_corner_normal(a.normal))
-        + weights.x * unit_from_octahedral(unpack_corner_normal(b.normal))
-        + weights.y * unit_from_octahedral(unpack_corner_normal(c.normal));
+    vec3 weights = weights_in_triangle(p, a.position, b.position, c.position, normal);
+    vec3 smooth_normal = weights.x * unit_from_octahedral(unpack_corner_normal(a.normal))
+        + weights.y * unit_from_octahedral(unpack_corner_normal(b.normal))
+        + weights.z * unit_from_octahedral(unpack_corner_normal(c.normal));
     if (dot(smooth_normal, smooth_normal) < 1.0e-12) {
         smooth_normal = normal;
     }

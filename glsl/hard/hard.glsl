@@ -11,6 +11,7 @@
 #define ANTUMBRA_HARD_GLSL
 
 #include "common/light_view.glsl"
+#include "common/materials.glsl"
 #include "common/triangles.glsl"
 
 // Defined by the entry file: textureGather from a view's map.
@@ -23,6 +24,9 @@ uvec4 gather_map_ids(vec2 place, uint view); // triangle numbers plus one, 0 for
 // ones leave dark specks.
 layout(constant_id = 0) const float SNAP_TEXELS = 4.0 / 256.0;
 const float DEPTH_ROUNDING = 1.0 / 1048576.0;
+
+// 1 where triangles of the scene may have holes.
+layout(constant_id = 1) const uint MASKED = 0u;
 
 // Rounding of positions, as a part of the largest coordinate: a few units of the last place. A
 // triangle nearer to the receiver than that is the receiver's own, or one with it.
@@ -51,7 +55,8 @@ uint test_triangle(Receiver receiver, uint triangle, float texel_m, float extent
     vec3 a = fetch_corner(triangle, 0u).position - receiver.position;
     vec3 b = fetch_corner(triangle, 1u).position - receiver.position;
     vec3 c = fetch_corner(triangle, 2u).position - receiver.position;
-    vec3 normal = fetch_geometric_normal(triangle);
+    vec4 plane = fetch_triangle_texel(4u * triangle + 3u);
+    vec3 normal = plane.xyz;
     float height = dot(normal, a); // of the triangle's plane over the receiver
     float climb = dot(normal, receiver.to_light);
     bool ahead = abs(height) > POSITION_ROUNDING * extent_m
@@ -61,6 +66,12 @@ uint test_triangle(Receiver receiver, uint triangle, float texel_m, float extent
     precise float v = dot(receiver.to_light, cross(a, c));
     precise float w = dot(receiver.to_light, cross(b, a));
     bool inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+    if (MASKED != 0u && material_is_masked(plane.w) && ahead && inside) {
+        // A ray in the plane of the triangle has no one place in it.
+        float area = u + v + w;
+        vec3 weights = area != 0.0 ? vec3(u, v, w) / area : vec3(1.0, 0.0, 0.0);
+        inside = !is_hole(material_number(plane.w), fetch_uv(triangle, weights));
+    }
     // Width of the triangle as the light sees it: twice its area over its longest edge.
     vec3 ab = b - a;
     vec3 bc = c - b;

@@ -2,17 +2,17 @@
 // Visibility of a light's centre at every pixel.
 
 #include "common/camera.glsl"
+#include "common/materials.glsl"
 #include "common/octahedral.glsl"
+#include "common/tiles.glsl"
 #include "hard/hard.glsl"
+#include "hard/params.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(set = 0, binding = 0, std140) uniform HardParams {
-    Camera camera;
-    vec4 light;   // xyz: centre, or the unit vector towards a sun; w: 1 or 0
-    uvec4 counts; // views, map size in texels, width and height in pixels
-    LightView views[MAX_LIGHT_VIEWS];
-} params;
+layout(set = 0, binding = 0, std140) uniform HardBlock {
+    HardParams params;
+};
 layout(set = 0, binding = 1) uniform sampler2D view_depth;
 layout(set = 0, binding = 2) uniform usampler2D geometric_normal;
 layout(set = 0, binding = 3) uniform sampler2DArray map_depth;
@@ -20,6 +20,13 @@ layout(set = 0, binding = 4) uniform usampler2DArray map_ids;
 layout(set = 0, binding = 5) uniform sampler2D triangles;
 layout(set = 0, binding = 6) uniform usampler2D ids;
 layout(set = 0, binding = 7, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 8, std140) uniform Arguments {
+    TileArguments arguments;
+};
+layout(set = 0, binding = 9) uniform usampler2D list;
+layout(set = 0, binding = 10) uniform sampler2D materials;
+layout(set = 0, binding = 11) uniform sampler2D uvs;
+layout(set = 0, binding = 12) uniform sampler2D texels;
 
 vec4 gather_map_depths(vec2 place, uint view) {
     return textureGather(map_depth, vec3(place, float(view)));
@@ -31,6 +38,18 @@ uvec4 gather_map_ids(vec2 place, uint view) {
 
 vec4 fetch_triangle_texel(uint texel) {
     return texelFetch(triangles, triangle_texel_place(texel), 0);
+}
+
+vec4 fetch_material_texel(ivec2 place) {
+    return texelFetch(materials, place, 0);
+}
+
+vec4 fetch_uv_texel(ivec2 place) {
+    return texelFetch(uvs, place, 0);
+}
+
+vec4 fetch_texture_texel(ivec2 place) {
+    return texelFetch(texels, place, 0);
 }
 
 float pixel_visibility(uvec2 pixel) {
@@ -66,8 +85,15 @@ float pixel_visibility(uvec2 pixel) {
 }
 
 void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
-    if (any(greaterThanEqual(pixel, params.counts.zw))) {
+    uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
+    if (index >= arguments.count) {
+        return;
+    }
+    uvec2 size = params.counts.zw;
+    uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
+    uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
+    uvec2 pixel = tile_of_entry(entry, tiles) * TILE_SIZE + gl_LocalInvocationID.xy;
+    if (any(greaterThanEqual(pixel, size))) {
         return;
     }
     imageStore(visibility, ivec2(pixel), vec4(pixel_visibility(pixel)));

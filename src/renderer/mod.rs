@@ -1,34 +1,27 @@
-//! What every frame has around its shadows: scene buffers, G-buffer, shading.
+//! Frames: surfaces, each light's visibility, shading.
 //!
 //! [`add_frame`] declares a whole picture in a graph:
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
-//! | `gbuffer.ids` | vertices, indices | triangle ids, depth |
-//! | `gbuffer.surface` | ids, triangles | view depth, geometric and shading normal |
+//! | `frame.params` | | camera and lights for all passes |
+//! | `gbuffer.*` | scene | the surface at each pixel ([`crate::geometry`]) |
 //! | the technique's, for each light | the above | visibility |
-//! | `shade.base` | ids, materials | radiance |
+//! | `shade.base` | ids, materials, textures | albedo, finish, radiance without any light |
 //! | `shade.light`, for each light | all of the above | radiance, added |
 
-mod camera;
-mod draw;
-mod gbuffer;
-mod scene_buffers;
-mod scene_layout;
 mod shade;
-mod visible;
 
-pub use camera::{PixelCamera, frustum_sees};
-pub use draw::draw_ids;
-pub use gbuffer::{GBuffer, add_gbuffer};
-pub use scene_buffers::{Draw, SceneBuffers, SceneIds, UploadError};
-pub use shade::{Ambient, LightPush, add_shading};
-pub use visible::visible_hulls;
+pub use crate::geometry::{
+    Draw, GBuffer, PixelCamera, SceneBuffers, SceneIds, UploadError, frustum_sees, visible_hulls,
+};
+pub use shade::{Ambient, Shading, ShadingInputs, add_shading};
 
-use crate::graph::{Graph, ImageId};
+use crate::geometry::{add_gbuffer, add_tile_bounds};
+use crate::graph::{Access, BufferDesc, BufferId, BufferPart, Graph, ImageId, PassKind};
 use crate::light::AreaLight;
 use crate::scene::SceneCamera;
-use crate::shadow::{ShadowInputs, ShadowMask, Technique};
+use crate::shadow::{LightParams, ShadowInputs, ShadowMask, Technique, ViewParams};
 use std::ops::Range;
 
 /// A light with the name that its passes and files get.
@@ -47,13 +40,17 @@ pub struct Frame {
     pub gbuffer: GBuffer,
     /// R32F visibility of each light.
     pub visibility: Vec<ImageId>,
+    /// Everything that the technique made for each light.
+    pub masks: Vec<ShadowMask>,
     /// Passes that make each light's visibility, by place in the order of declaration.
     pub visibility_passes: Vec<Range<usize>>,
+    /// RGBA8 sRGB base colour of each pixel's surface.
+    pub albedo: ImageId,
     /// RGBA32F, linear radiance; alpha 1 on surfaces, 0 elsewhere.
     pub radiance: ImageId,
 }
 
-/// Declares a picture of `size` pixels: G-buffer, visibility of every light, shading.
+/// Declares a picture of `size` pixels: surfaces, visibility of every light, shading.
 pub fn add_frame<'f>(
     graph: &mut Graph<'f>,
     scene: &'f SceneBuffers,
@@ -64,38 +61,86 @@ pub fn add_frame<'f>(
 ) -> Frame {
     let ids = scene.import(graph);
     let pixels = PixelCamera::new(camera, size);
+    let (params, parts) = add_params(graph, pixels, lights);
     let gbuffer = add_gbuffer(graph, scene, &ids, camera, size);
+    let tile_bounds = add_tile_bounds(graph, &gbuffer, size);
     let boxes = scene.draws().iter().map(|draw| draw.bounds);
     let receivers = visible_hulls(camera, size, boxes);
-    let mut visibility = Vec::with_capacity(lights.len());
+    let mut masks = Vec::with_capacity(lights.len());
     let mut visibility_passes = Vec::with_capacity(lights.len());
-    for light in lights {
+    for (light, part) in lights.iter().zip(&parts) {
         let first = graph.pass_count();
-        let ShadowMask { visibility: mask } = technique.add_passes(
+        masks.push(technique.add_passes(
             graph,
             &ShadowInputs {
                 light_name: light.name.clone(),
                 light: light.light,
                 camera: pixels,
-                ids: gbuffer.ids,
-                view_depth: gbuffer.view_depth,
-                geometric_normal: gbuffer.geometric_normal,
+                gbuffer,
+                tile_bounds,
+                view_params: (params, *part),
                 receivers: receivers.clone(),
                 scene,
-                triangles: ids.triangles,
-                vertices: ids.vertices,
-                indices: ids.indices,
+                ids,
             },
-        );
-        visibility.push(mask);
+        ));
         visibility_passes.push(first..graph.pass_count());
     }
-    let ambient = Ambient::of(lights, scene.bounds());
-    let radiance = add_shading(graph, &ids, &gbuffer, pixels, lights, &visibility, ambient);
+    let shading = add_shading(
+        graph,
+        &ShadingInputs {
+            scene,
+            ids: &ids,
+            gbuffer: &gbuffer,
+            camera: pixels,
+            lights,
+            masks: &masks,
+            params,
+            parts: &parts,
+            ambient: Ambient::of(lights, scene.bounds()),
+        },
+    );
     Frame {
         gbuffer,
-        visibility,
+        visibility: masks.iter().map(|mask| mask.visibility).collect(),
+        masks,
         visibility_passes,
-        radiance,
+        albedo: shading.albedo,
+        radiance: shading.radiance,
     }
+}
+
+/// Space of a light's block in the buffer: the largest alignment that a device may ask for.
+const BLOCK: u64 = 256;
+
+/// Declares the pass that writes [`ViewParams`] for each light.
+fn add_params(
+    graph: &mut Graph<'_>,
+    camera: PixelCamera,
+    lights: &[NamedLight],
+) -> (BufferId, Vec<BufferPart>) {
+    let size = BLOCK * lights.len().max(1) as u64;
+    let buffer = graph.create_buffer("frame.params", BufferDesc { size });
+    let mut pass = graph.pass("frame.params", PassKind::Transfer);
+    let buffer = pass.overwrite(buffer, Access::Clear);
+    let blocks: Vec<ViewParams> = lights
+        .iter()
+        .map(|named| ViewParams {
+            camera,
+            light: LightParams::new(&named.light),
+        })
+        .collect();
+    let parts = (0..blocks.len() as u64).map(|index| BufferPart {
+        offset: index * BLOCK,
+        size: size_of::<ViewParams>() as u64,
+    });
+    let parts: Vec<BufferPart> = parts.collect();
+    let written = parts.clone();
+    pass.record(move |ctx| {
+        for (block, part) in blocks.iter().zip(written) {
+            ctx.update_buffer(buffer, part.offset, bytemuck::bytes_of(block))?;
+        }
+        Ok(())
+    });
+    (buffer, parts)
 }

@@ -1,13 +1,13 @@
-//! Lambert shading: an ambient term, then each light times its visibility.
+//! Shading: an ambient term and what surfaces give off, then each light times its visibility.
 
 use super::NamedLight;
-use super::camera::PixelCamera;
-use super::gbuffer::GBuffer;
-use super::scene_buffers::SceneIds;
+use crate::geometry::{GBuffer, PixelCamera, SceneBuffers, SceneIds};
 use crate::gpu::{Blend, GraphicsPipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, Graph, ImageDesc, ImageId, Load, PassKind, Stage};
-use crate::light::AreaLight;
+use crate::graph::{
+    Access, Bind, BufferId, BufferPart, Graph, ImageDesc, ImageId, Load, PassKind, Stage,
+};
 use crate::scene::Aabb;
+use crate::shadow::{ShadowMask, shape_number};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -48,132 +48,126 @@ impl Ambient {
 
 /// Push constants of `shade/base.frag`.
 #[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct BasePush {
-    ambient: [f32; 4],
-    background: [f32; 4],
-}
-
-/// Push constants of `shade/light.frag`.
-#[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct LightPush {
-    /// Scene space, metres.
-    pub eye: [f32; 3],
-    /// 1/m; 0 for no limit.
-    pub inverse_range: f32,
-    /// As in [`PixelCamera`].
-    pub corner_ray: [f32; 3],
-    /// Cosine at which a spot cone begins to fade; 2 for no cone.
-    pub cos_inner: f32,
-    /// As in [`PixelCamera`].
-    pub pixel_right: [f32; 3],
-    /// Cosine at which a spot cone ends.
-    pub cos_outer: f32,
-    /// As in [`PixelCamera`].
-    pub pixel_down: [f32; 3],
-    /// 1 if it emits like a Lambert surface, 0 if the same all round.
-    pub one_sided: f32,
-    /// Centre, or the unit vector towards a sun.
-    pub light: [f32; 3],
-    /// 1, or 0 for a sun.
-    pub positional: f32,
-    /// Unit vector that the light emits along.
-    pub direction: [f32; 3],
-    /// Padding.
-    pub unused: f32,
-    /// Candela along the axis, or lux of a sun; linear RGB.
-    pub intensity: [f32; 3],
-    /// Padding.
-    pub unused_too: f32,
+pub struct BasePush {
+    /// The camera.
+    pub camera: PixelCamera,
+    /// Radiance of a white surface.
+    pub ambient: [f32; 4],
+    /// Radiance where nothing was hit.
+    pub background: [f32; 4],
 }
 
-impl LightPush {
-    fn new(camera: &PixelCamera, light: &AreaLight) -> Self {
-        let xyz = |row: [f32; 4]| [row[0], row[1], row[2]];
-        let sun = light.shape.is_sun();
-        let cone = light.spot.map(|cone| (cone.inner.cos(), cone.outer.cos()));
-        let (cos_inner, cos_outer) = cone.unwrap_or((2.0, -1.0));
-        Self {
-            eye: xyz(camera.eye),
-            inverse_range: light.range.map_or(0.0, |range| 1.0 / range),
-            corner_ray: xyz(camera.corner_ray),
-            cos_inner,
-            pixel_right: xyz(camera.pixel_right),
-            cos_outer,
-            pixel_down: xyz(camera.pixel_down),
-            one_sided: f32::from(u8::from(light.shape.is_one_sided())),
-            light: if sun { -light.direction } else { light.center }.to_array(),
-            positional: f32::from(u8::from(!sun)),
-            direction: light.direction.to_array(),
-            unused: 0.0,
-            intensity: (light.color * light.candela()).to_array(),
-            unused_too: 0.0,
-        }
-    }
+/// What shading is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadingInputs<'a> {
+    /// The scene on the device.
+    pub scene: &'a SceneBuffers,
+    /// Its resources in the graph.
+    pub ids: &'a SceneIds,
+    /// The surface at each pixel.
+    pub gbuffer: &'a GBuffer,
+    /// The picture's camera.
+    pub camera: PixelCamera,
+    /// The lights.
+    pub lights: &'a [NamedLight],
+    /// What the technique made for each light.
+    pub masks: &'a [ShadowMask],
+    /// A uniform buffer with [`ViewParams`](crate::shadow::ViewParams) of each light.
+    pub params: BufferId,
+    /// Where in it each light's are.
+    pub parts: &'a [BufferPart],
+    /// Light from nowhere in particular.
+    pub ambient: Ambient,
 }
 
-/// Declares the shading passes; returns RGBA32F radiance.
-pub fn add_shading(
-    graph: &mut Graph<'_>,
-    ids: &SceneIds,
-    gbuffer: &GBuffer,
-    camera: PixelCamera,
-    lights: &[NamedLight],
-    visibility: &[ImageId],
-    ambient: Ambient,
-) -> ImageId {
-    let [width, height] = camera.size();
-    let desc = ImageDesc::new(vk::Format::R32G32B32A32_SFLOAT, width, height);
-    let radiance = graph.create_image("radiance", desc);
-    let (triangle_ids, triangles, materials) = (gbuffer.ids, ids.triangles, ids.materials);
+/// Images that shading makes, of the picture's size.
+#[derive(Clone, Copy, Debug)]
+pub struct Shading {
+    /// RGBA8 sRGB base colour.
+    pub albedo: ImageId,
+    /// RGBA32F linear radiance; alpha 1 on surfaces, 0 elsewhere.
+    pub radiance: ImageId,
+}
+
+/// Declares the shading passes.
+pub fn add_shading(graph: &mut Graph<'_>, inputs: &ShadingInputs<'_>) -> Shading {
+    let [width, height] = inputs.camera.size();
+    let image = |format| ImageDesc::new(format, width, height);
+    let radiance = graph.create_image("radiance", image(vk::Format::R32G32B32A32_SFLOAT));
+    let albedo = graph.create_image("shade.albedo", image(vk::Format::R8G8B8A8_SRGB));
+    let finish = graph.create_image("shade.finish", image(vk::Format::R8G8_UNORM));
+    let (gbuffer, ids) = (*inputs.gbuffer, *inputs.ids);
     let nearest = SamplerDesc::nearest();
-    let scene_bindings = move || {
-        vec![
-            Bind::sampled(0, triangle_ids, nearest),
-            Bind::sampled(1, triangles, nearest),
-            Bind::sampled(2, materials, nearest),
-        ]
-    };
+    let fragment = Access::Sampled(Stage::Fragment);
 
     let mut pass = graph.pass("shade.base", PassKind::Graphics);
-    for image in [triangle_ids, triangles, materials] {
-        pass.read(image, Access::Sampled(Stage::Fragment));
+    for image in [gbuffer.ids, gbuffer.view_depth, ids.triangles] {
+        pass.read(image, fragment);
+    }
+    for image in ids.mask_images() {
+        pass.read(image, fragment);
     }
     let mut radiance = pass.color(radiance, Load::Discard);
+    let albedo = pass.color(albedo, Load::Discard);
+    let finish = pass.color(finish, Load::Discard);
+    let push = BasePush {
+        camera: inputs.camera,
+        ambient: (inputs.ambient.surface)
+            .extend(inputs.scene.textured_triangle_count() as f32)
+            .to_array(),
+        background: inputs.ambient.background.extend(0.0).to_array(),
+    };
+    let textured = u32::from(inputs.scene.textured_triangle_count() > 0);
     pass.record(move |ctx| {
         let fragment = Some(&spirv::SHADE_BASE_FRAG);
-        let pipeline = GraphicsPipelineDesc::new(&spirv::SCREEN_FULLSCREEN_VERT, fragment);
-        let push = BasePush {
-            ambient: ambient.surface.extend(0.0).to_array(),
-            background: ambient.background.extend(0.0).to_array(),
-        };
-        ctx.bind_graphics(pipeline, &scene_bindings(), bytemuck::bytes_of(&push))?;
+        let mut pipeline = GraphicsPipelineDesc::new(&spirv::SCREEN_FULLSCREEN_VERT, fragment);
+        pipeline.constants = vec![(0, textured)];
+        let bindings = [
+            Bind::sampled(0, gbuffer.ids, nearest),
+            Bind::sampled(1, ids.triangles, nearest),
+            Bind::sampled(2, ids.materials, nearest),
+            Bind::sampled(3, ids.triangle_uvs, nearest),
+            Bind::sampled(4, ids.texels, nearest),
+            Bind::sampled(5, gbuffer.view_depth, nearest),
+        ];
+        ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&push))?;
         ctx.draw(0, 3, 1);
         Ok(())
     });
 
-    let (view_depth, normal) = (gbuffer.view_depth, gbuffer.shading_normal);
-    for (named, mask) in lights.iter().zip(visibility) {
-        let mask = *mask;
-        let push = LightPush::new(&camera, &named.light);
+    let shiny = u32::from(inputs.scene.is_shiny());
+    for (index, named) in inputs.lights.iter().enumerate() {
+        let (params, part) = (inputs.params, inputs.parts[index]);
+        let mask = inputs.masks[index].visibility;
+        let shape = shape_number(&named.light.shape);
         let mut pass = graph.pass(format!("shade.light {}", named.name), PassKind::Graphics);
-        for image in [triangle_ids, triangles, materials, view_depth, normal, mask] {
-            pass.read(image, Access::Sampled(Stage::Fragment));
+        pass.read_part(params, part, Access::Uniform(Stage::Fragment));
+        let images = [
+            gbuffer.view_depth,
+            gbuffer.geometric_normal,
+            gbuffer.shading_normal,
+            albedo,
+            finish,
+            mask,
+        ];
+        for image in images {
+            pass.read(image, fragment);
         }
         radiance = pass.color(radiance, Load::Keep);
         pass.record(move |ctx| {
             let fragment = Some(&spirv::SHADE_LIGHT_FRAG);
             let mut pipeline = GraphicsPipelineDesc::new(&spirv::SCREEN_FULLSCREEN_VERT, fragment);
             pipeline.blend = Blend::Add;
-            let mut bindings = scene_bindings();
-            bindings.push(Bind::sampled(3, view_depth, nearest));
-            bindings.push(Bind::sampled(4, normal, nearest));
-            bindings.push(Bind::sampled(5, mask, nearest));
-            ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&push))?;
+            pipeline.constants = vec![(0, shape), (1, shiny)];
+            let mut bindings = vec![Bind::uniform(0, params).part(part)];
+            let sampled = images.iter().zip(1..);
+            bindings
+                .extend(sampled.map(|(image, binding)| Bind::sampled(binding, *image, nearest)));
+            ctx.bind_graphics(pipeline, &bindings, &[])?;
             ctx.draw(0, 3, 1);
             Ok(())
         });
     }
-    radiance
+    Shading { albedo, radiance }
 }

@@ -5,21 +5,21 @@
 //! triangles beside depths, and a receiver's ray is tested against those around its texel: edges
 //! lie where they belong and no bias is needed (`glsl/hard/hard.glsl`).
 //!
-//! Passes: parameters, one map pass a view, visibility. A light without casters has none of the
-//! first two, and its visibility is the part above each receiver's tangent plane.
+//! Passes: parameters, one map pass a view, tiles, visibility. Tiles that see nothing or are turned
+//! away from the light are settled without a look at the map.
 
 use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
 use super::{ShadowInputs, ShadowMask};
+use crate::geometry::{PixelCamera, TileList, draw_ids, read_for_draw, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferDesc, Graph, ImageDesc, ImagePart, Load, PassKind, Stage};
-use crate::renderer::{PixelCamera, draw_ids};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
 /// Width and height of each map in texels.
 pub const MAP_SIZE: u32 = 2048;
 
-/// Uniform block of `hard/visibility.comp`.
+/// Uniform block of both compute passes: `hard/params.glsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct HardParams {
@@ -52,21 +52,28 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
     };
     params.views[..views.views.len()].copy_from_slice(&views.views);
 
+    let size = [width, height];
     let buffer = graph.create_buffer(
         format!("hard.params {name}"),
         BufferDesc {
             size: size_of::<HardParams>() as u64,
         },
     );
+    let mut list = TileList::create(graph, &format!("hard.tiles {name}"), size);
     let mut pass = graph.pass(format!("hard.params {name}"), PassKind::Transfer);
     let buffer = pass.overwrite(buffer, Access::Clear);
-    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
+    list.clear(&mut pass);
+    let cleared = list;
+    pass.record(move |ctx| {
+        cleared.record_clear(ctx)?;
+        ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params))
+    });
 
     // Arrays of at least one layer, so that the shader's bindings always have something: a light
     // without casters has single texels cleared and never read.
     let layers = views.views.len().max(1) as u32;
-    let size = if views.views.is_empty() { 1 } else { MAP_SIZE };
-    let image = |format| ImageDesc::new(format, size, size).layers(layers);
+    let side = if views.views.is_empty() { 1 } else { MAP_SIZE };
+    let image = |format| ImageDesc::new(format, side, side).layers(layers);
     let depth = image(vk::Format::D32_SFLOAT);
     let mut map_depth = graph.create_image(format!("hard.map_depth {name}"), depth);
     let numbers = image(vk::Format::R32_UINT);
@@ -79,47 +86,77 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
         let Some(matrix) = views.clip_from_scene.get(layer as usize).copied() else {
             continue;
         };
-        pass.read(inputs.vertices, Access::Vertex);
-        pass.read(inputs.indices, Access::Index);
-        let (vertices, indices) = (inputs.vertices, inputs.indices);
-        pass.record(move |ctx| draw_ids(ctx, scene, vertices, indices, &matrix));
+        read_for_draw(&mut pass, scene, &inputs.ids);
+        let ids = inputs.ids;
+        pass.record(move |ctx| draw_ids(ctx, scene, &ids, &matrix));
     }
 
+    let nearest = SamplerDesc::nearest();
+    let compute = Access::Sampled(Stage::Compute);
     let desc = ImageDesc::new(vk::Format::R32_SFLOAT, width, height);
     let visibility = graph.create_image(format!("visibility {name}"), desc);
-    let mut pass = graph.pass(format!("hard.visibility {name}"), PassKind::Compute);
+    let tile_bounds = inputs.tile_bounds;
+    let mut pass = graph.pass(format!("hard.tiles {name}"), PassKind::Compute);
     pass.read(buffer, Access::Uniform(Stage::Compute));
-    pass.read(inputs.view_depth, Access::Sampled(Stage::Compute));
-    pass.read(inputs.geometric_normal, Access::Sampled(Stage::Compute));
-    for image in [map_depth, map_ids, inputs.triangles, inputs.ids] {
-        pass.read(image, Access::Sampled(Stage::Compute));
-    }
+    pass.read(tile_bounds, compute);
+    list.fill(&mut pass);
     let visibility = pass.overwrite(visibility, Access::StorageWrite(Stage::Compute));
-    let (view_depth, geometric_normal) = (inputs.view_depth, inputs.geometric_normal);
-    let (triangles, ids) = (inputs.triangles, inputs.ids);
+    let filled = list;
     pass.record(move |ctx| {
-        let shader = &spirv::HARD_VISIBILITY_COMP;
-        let nearest = SamplerDesc::nearest();
+        let shader = &spirv::HARD_TILES_COMP;
         let bindings = [
             Bind::uniform(0, buffer),
-            Bind::sampled(1, view_depth, nearest),
-            Bind::sampled(2, geometric_normal, nearest),
+            Bind::sampled(1, tile_bounds, nearest),
+            Bind::storage_buffer(2, filled.arguments),
+            Bind::storage_image(3, filled.tiles),
+            Bind::storage_image(4, visibility),
+        ];
+        ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
+        let [across, down] = tile_counts(size);
+        ctx.dispatch(shader.groups([across * down, 1, 1]));
+        Ok(())
+    });
+
+    let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
+    let mut pass = graph.pass(format!("hard.visibility {name}"), PassKind::Compute);
+    pass.read(buffer, Access::Uniform(Stage::Compute));
+    for image in [gbuffer.view_depth, gbuffer.geometric_normal, gbuffer.ids] {
+        pass.read(image, compute);
+    }
+    for image in [map_depth, map_ids, ids.triangles] {
+        pass.read(image, compute);
+    }
+    for image in ids.mask_images() {
+        pass.read(image, compute);
+    }
+    list.read(&mut pass);
+    let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
+    let masked = u32::from(scene.has_masks());
+    pass.record(move |ctx| {
+        let bindings = [
+            Bind::uniform(0, buffer),
+            Bind::sampled(1, gbuffer.view_depth, nearest),
+            Bind::sampled(2, gbuffer.geometric_normal, nearest),
             Bind::sampled(3, map_depth, nearest).array(),
             Bind::sampled(4, map_ids, nearest).array(),
-            Bind::sampled(5, triangles, nearest),
-            Bind::sampled(6, ids, nearest),
+            Bind::sampled(5, ids.triangles, nearest),
+            Bind::sampled(6, gbuffer.ids, nearest),
             Bind::storage_image(7, visibility),
+            Bind::uniform(8, list.arguments),
+            Bind::sampled(9, list.tiles, nearest),
+            Bind::sampled(10, ids.materials, nearest),
+            Bind::sampled(11, ids.triangle_uvs, nearest),
+            Bind::sampled(12, ids.texels, nearest),
         ];
         // Four steps of the grid that vertices snap to: SNAP_TEXELS in hard.glsl.
         let steps = ctx.gpu().info().limits.sub_pixel_precision_bits.min(16);
         let snap = 4.0 / (1u32 << steps) as f32;
         let pipeline = ComputePipelineDesc {
-            constants: vec![(0, snap.to_bits())],
-            ..ComputePipelineDesc::new(shader)
+            constants: vec![(0, snap.to_bits()), (1, masked)],
+            ..ComputePipelineDesc::new(&spirv::HARD_VISIBILITY_COMP)
         };
         ctx.bind_compute(&pipeline, &bindings, &[])?;
-        ctx.dispatch(shader.groups([width, height, 1]));
-        Ok(())
+        list.dispatch(ctx)
     });
-    ShadowMask { visibility }
+    ShadowMask::new(visibility)
 }

@@ -1,13 +1,15 @@
 //! Shadow techniques under one interface.
 
 pub mod hard;
+mod light_params;
 mod light_view;
 
+pub use light_params::{LightParams, ViewParams, shape_number};
 pub use light_view::{LightView, LightViews, light_views};
 
-use crate::graph::{BufferId, Graph, ImageId};
+use crate::geometry::{GBuffer, PixelCamera, SceneBuffers, SceneIds};
+use crate::graph::{BufferId, BufferPart, Graph, ImageId};
 use crate::light::{AreaLight, ShapeKind};
-use crate::renderer::{PixelCamera, SceneBuffers};
 use glam::DVec3;
 
 /// How visibility is found.
@@ -171,31 +173,41 @@ pub struct ShadowInputs<'f> {
     pub light: AreaLight,
     /// Camera of the picture.
     pub camera: PixelCamera,
-    /// R32_UINT, the picture's size: number of the triangle plus one; 0 where nothing was hit.
-    pub ids: ImageId,
-    /// R32F, the picture's size: distance in metres along the view direction; 0 where nothing was
-    /// hit.
-    pub view_depth: ImageId,
-    /// R32_UINT, the picture's size: geometric normal as in `common/octahedral.glsl`, turned to
-    /// the camera.
-    pub geometric_normal: ImageId,
+    /// The surface at each pixel.
+    pub gbuffer: GBuffer,
+    /// Bounds of the surfaces in each tile: [`crate::geometry::add_tile_bounds`].
+    pub tile_bounds: ImageId,
+    /// [`ViewParams`] of this light: a uniform buffer, and the part of it.
+    pub view_params: (BufferId, BufferPart),
     /// Convex hulls of what the picture can show: all pixels' surfaces lie in one of them. Scene
     /// space, metres.
     pub receivers: Vec<Vec<DVec3>>,
     /// All triangles, which are also all casters.
     pub scene: &'f SceneBuffers,
-    /// The scene's triangles in this graph: `common/triangles.glsl`.
-    pub triangles: ImageId,
-    /// The scene's vertex buffer in this graph.
-    pub vertices: BufferId,
-    /// The scene's index buffer in this graph.
-    pub indices: BufferId,
+    /// The scene's resources in this graph.
+    pub ids: SceneIds,
 }
 
-/// What a technique makes for one light.
+/// What a technique makes for one light. All images are of the picture's size.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct ShadowMask {
-    /// R32F, the picture's size: the part of the light that is seen, 0 to 1; 1 where nothing was
-    /// hit.
+    /// R32F: the part of the light that is seen, 0 to 1; 1 where nothing was hit.
     pub visibility: ImageId,
+    /// RG32F, of a line: how much of the light that its visible parts give comes from its two
+    /// ends, for shading. `None` shades with the visibility alone.
+    pub end_influences: Option<ImageId>,
+    /// R32F: a bound on the error of `visibility`; `None` where the technique proves none.
+    pub error_bound: Option<ImageId>,
+}
+
+impl ShadowMask {
+    /// Visibility and nothing else.
+    pub fn new(visibility: ImageId) -> Self {
+        Self {
+            visibility,
+            end_influences: None,
+            error_bound: None,
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Which triangle each pixel sees, and the surface there.
 
 use super::camera::PixelCamera;
-use super::draw::draw_ids;
+use super::draw::{draw_ids, read_for_draw};
 use super::scene_buffers::{SceneBuffers, SceneIds};
 use crate::gpu::{GraphicsPipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, Graph, ImageDesc, ImageId, Load, PassKind, Stage};
@@ -38,13 +38,12 @@ pub fn add_gbuffer<'f>(
     let triangle_ids = graph.create_image("gbuffer.ids", image(vk::Format::R32_UINT));
     let depth = graph.create_image("gbuffer.depth", image(vk::Format::D32_SFLOAT));
     let mut pass = graph.pass("gbuffer.ids", PassKind::Graphics);
-    pass.read(ids.vertices, Access::Vertex);
-    pass.read(ids.indices, Access::Index);
+    read_for_draw(&mut pass, scene, ids);
     let triangle_ids = pass.color(triangle_ids, Load::Clear([0.0; 4]));
     // Nobody reads the depth afterwards: the surface pass finds it more exactly.
     let _ = pass.depth(depth, Load::Clear([0.0; 4]));
-    let (vertices, indices) = (ids.vertices, ids.indices);
-    pass.record(move |ctx| draw_ids(ctx, scene, vertices, indices, &matrix));
+    let scene_ids = *ids;
+    pass.record(move |ctx| draw_ids(ctx, scene, &scene_ids, &matrix));
 
     let view_depth = graph.create_image("gbuffer.view_depth", image(vk::Format::R32_SFLOAT));
     let geometric = graph.create_image("gbuffer.geometric_normal", image(vk::Format::R32_UINT));

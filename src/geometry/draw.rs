@@ -1,0 +1,144 @@
+//! Drawing the scene's triangle numbers, as cameras and lights see them.
+
+use super::camera::frustum_sees;
+use super::scene_buffers::{Draw, SceneBuffers, SceneIds};
+use crate::gpu::{DepthState, GpuError, GraphicsPipelineDesc, SamplerDesc, spirv};
+use crate::graph::{Access, Bind, PassBuilder, PassContext, Stage};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::Mat4;
+
+/// Push constants of `raster/ids_masked.vert` and `.frag`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct MaskedPush {
+    clip_from_scene: [[f32; 4]; 4],
+    material: u32,
+}
+
+/// Declares what [`draw_ids`] reads.
+pub fn read_for_draw(pass: &mut PassBuilder<'_, '_>, scene: &SceneBuffers, ids: &SceneIds) {
+    pass.read(ids.vertices, Access::Vertex);
+    pass.read(ids.indices, Access::Index);
+    if scene.has_masks() {
+        pass.read(ids.mask_uvs, Access::Vertex);
+        pass.read(ids.materials, Access::Sampled(Stage::Fragment));
+        pass.read(ids.texels, Access::Sampled(Stage::Fragment));
+    }
+}
+
+/// Draws all triangles that a view may see into the pass's R32_UINT colour attachment (triangle
+/// number plus one) and its depth attachment (reversed: cleared to 0, greater is nearer). The pass
+/// has declared [`read_for_draw`].
+pub fn draw_ids(
+    ctx: &mut PassContext<'_>,
+    scene: &SceneBuffers,
+    ids: &SceneIds,
+    clip_from_scene: &Mat4,
+) -> Result<(), GpuError> {
+    let seen = |draw: &&Draw| frustum_sees(clip_from_scene, &draw.bounds);
+    let seen: Vec<&Draw> = scene.draws().iter().filter(seen).collect();
+    let runs = runs(&seen);
+    let depth = Some(DepthState {
+        compare: vk::CompareOp::GREATER,
+        write: true,
+    });
+    let (masked, solid): (Vec<&Run>, Vec<&Run>) = runs.iter().partition(|run| run.mask.is_some());
+    if !solid.is_empty() {
+        let fragment = Some(&spirv::RASTER_IDS_FRAG);
+        let mut pipeline = GraphicsPipelineDesc::new(&spirv::RASTER_IDS_VERT, fragment);
+        pipeline.vertex_layout = vec![scene.id_stream()];
+        pipeline.depth = depth;
+        ctx.bind_graphics(pipeline, &[], bytemuck::bytes_of(clip_from_scene))?;
+        ctx.bind_vertices(&[(ids.vertices, 0)])?;
+        ctx.bind_indices(ids.indices, 0)?;
+        for run in solid {
+            ctx.draw_indexed(run.first_index, run.index_count, 0);
+        }
+    }
+    for run in masked {
+        let fragment = Some(&spirv::RASTER_IDS_MASKED_FRAG);
+        let mut pipeline = GraphicsPipelineDesc::new(&spirv::RASTER_IDS_MASKED_VERT, fragment);
+        pipeline.vertex_layout = vec![scene.id_stream(), scene.mask_stream()];
+        pipeline.depth = depth;
+        let push = MaskedPush {
+            clip_from_scene: clip_from_scene.to_cols_array_2d(),
+            material: run.mask.unwrap_or_default(),
+        };
+        let nearest = SamplerDesc::nearest();
+        let bindings = [
+            Bind::sampled(0, ids.materials, nearest),
+            Bind::sampled(1, ids.texels, nearest),
+        ];
+        ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&push))?;
+        ctx.bind_vertices(&[(ids.vertices, 0), (ids.mask_uvs, 0)])?;
+        ctx.bind_indices(ids.indices, 0)?;
+        ctx.draw_indexed(run.first_index, run.index_count, 0);
+    }
+    Ok(())
+}
+
+/// Chunks that one draw covers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Run {
+    first_index: u32,
+    index_count: u32,
+    mask: Option<u32>,
+}
+
+/// Joins chunks that follow each other.
+fn runs(draws: &[&Draw]) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for draw in draws {
+        match runs.last_mut() {
+            Some(run)
+                if run.first_index + run.index_count == draw.first_index
+                    && run.mask == draw.mask =>
+            {
+                run.index_count += draw.index_count;
+            }
+            _ => runs.push(Run {
+                first_index: draw.first_index,
+                index_count: draw.index_count,
+                mask: draw.mask,
+            }),
+        }
+    }
+    runs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Aabb;
+
+    #[test]
+    fn chunks_that_follow_each_other_are_one_draw() {
+        let draw = |first_index, index_count, mask| Draw {
+            first_index,
+            index_count,
+            bounds: Aabb::EMPTY,
+            mask,
+        };
+        let run = |first_index, index_count, mask| Run {
+            first_index,
+            index_count,
+            mask,
+        };
+        let draws = [
+            draw(0, 6, Some(1)),
+            draw(6, 3, Some(1)),
+            draw(9, 3, Some(2)),
+            draw(12, 9, None),
+            draw(24, 3, None),
+            draw(27, 3, None),
+        ];
+        let expected = [
+            run(0, 9, Some(1)),
+            run(9, 3, Some(2)),
+            run(12, 9, None),
+            run(24, 6, None),
+        ];
+        assert_eq!(runs(&draws.iter().collect::<Vec<_>>()), expected);
+    }
+}

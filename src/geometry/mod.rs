@@ -1,0 +1,23 @@
+//! The scene on the device, and the surface that each pixel of a picture sees: what shadow
+//! techniques and shading both work on.
+//!
+//! | pass | reads | writes |
+//! |---|---|---|
+//! | `gbuffer.ids` | vertices, indices, textures of masked triangles | triangle ids, depth |
+//! | `gbuffer.surface` | ids, triangles | view depth, geometric and shading normal |
+//! | `gbuffer.tiles` | view depth, geometric normal | bounds of each tile's surfaces |
+
+mod camera;
+mod draw;
+mod gbuffer;
+mod scene_buffers;
+mod scene_layout;
+mod tiles;
+mod visible;
+
+pub use camera::{PixelCamera, frustum_sees};
+pub use draw::{draw_ids, read_for_draw};
+pub use gbuffer::{GBuffer, add_gbuffer};
+pub use scene_buffers::{Draw, SceneBuffers, SceneIds, UploadError};
+pub use tiles::{TILE_SIZE, TileList, add_tile_bounds, tile_counts};
+pub use visible::visible_hulls;

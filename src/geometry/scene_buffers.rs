@@ -1,0 +1,495 @@
+//! The scene on the device: vertices and indices to draw, triangles and materials to look up.
+
+use super::scene_layout::{IMAGE_WIDTH, Layout, Vertex};
+use crate::gpu::{Buffer, Gpu, GpuError, Image, ImageSpec, MemoryLocation, Retired};
+use crate::graph::{
+    Access, BufferDesc, BufferId, BufferState, FrameCache, Graph, GraphError, HostBuffer,
+    HostImage, ImageDesc, ImageId, ImagePart, ImageState, PassKind,
+};
+use crate::scene::{Aabb, Scene};
+use ash::vk;
+
+/// Why a scene cannot be brought to the device.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UploadError {
+    /// More triangles than the device's images hold.
+    #[error("the scene has {triangles} triangles; this device holds {most}")]
+    TooManyTriangles {
+        /// Triangles of the scene.
+        triangles: usize,
+        /// Triangles that fit.
+        most: usize,
+    },
+    /// More texels than the device's images hold.
+    #[error(
+        "the scene's textures have {texels} texels; this device holds {most}: make them smaller"
+    )]
+    TooManyTexels {
+        /// Texels of all textures that surfaces use.
+        texels: usize,
+        /// Texels that fit.
+        most: usize,
+    },
+    /// The device refused.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The upload's graph is wrong.
+    #[error(transparent)]
+    Graph(#[from] GraphError),
+}
+
+/// A range of indices with the box around it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Draw {
+    /// First index.
+    pub first_index: u32,
+    /// Number of indices.
+    pub index_count: u32,
+    /// Box around its vertices, scene space.
+    pub bounds: Aabb,
+    /// The material that cuts holes into it; `None` for solid triangles.
+    pub mask: Option<u32>,
+}
+
+/// The scene's buffers and images on the device. Static: uploaded once.
+#[derive(Debug)]
+pub struct SceneBuffers {
+    /// None in a stand-in that only plans ([`SceneBuffers::plan_only`]).
+    device: Option<DeviceBuffers>,
+    sizes: Sizes,
+    draws: Vec<Draw>,
+    bounds: Aabb,
+    triangles: usize,
+    degenerate: usize,
+    masked: bool,
+    textured: usize,
+    shiny: bool,
+}
+
+/// Number of buffers: vertices, texture coordinates of masked ones, indices.
+const BUFFERS: usize = 3;
+/// Number of images: triangles, texture coordinates, materials, texels.
+const IMAGES: usize = 4;
+
+#[derive(Debug)]
+struct DeviceBuffers {
+    buffers: Vec<Buffer>,
+    images: Vec<Image>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sizes {
+    buffers: [(u64, vk::BufferUsageFlags); BUFFERS],
+    images: [ImageDesc; IMAGES],
+}
+
+/// The scene's resources in one graph.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneIds {
+    /// Position and triangle number of each vertex.
+    pub vertices: BufferId,
+    /// Texture coordinates of the vertices that masked triangles use.
+    pub mask_uvs: BufferId,
+    /// 32-bit indices.
+    pub indices: BufferId,
+    /// `common/triangles.glsl`.
+    pub triangles: ImageId,
+    /// Texture coordinates of triangles: `common/materials.glsl`.
+    pub triangle_uvs: ImageId,
+    /// `common/materials.glsl`.
+    pub materials: ImageId,
+    /// Texels of all textures: `common/materials.glsl`.
+    pub texels: ImageId,
+}
+
+impl SceneIds {
+    /// The images that shaders look alpha up in.
+    pub fn mask_images(&self) -> [ImageId; 3] {
+        [self.triangle_uvs, self.materials, self.texels]
+    }
+}
+
+impl SceneBuffers {
+    /// Records the upload of a scene into `cmd`. Later commands on the same queue can use it at
+    /// once; what it was copied from is freed when the frame's slot begins anew.
+    pub fn upload(
+        gpu: &mut Gpu,
+        cmd: vk::CommandBuffer,
+        scene: &Scene,
+    ) -> Result<Self, UploadError> {
+        let most_rows = gpu.info().limits.max_image_dimension2_d as usize;
+        let most = most_rows * IMAGE_WIDTH / 4;
+        let triangles = scene.triangle_count();
+        if triangles > most {
+            return Err(UploadError::TooManyTriangles { triangles, most });
+        }
+        let layout = Layout::new(scene);
+        let (texels, most) = (layout.texels.len(), most_rows * IMAGE_WIDTH);
+        if texels > most {
+            return Err(UploadError::TooManyTexels { texels, most });
+        }
+        let mut buffers = Self::without_device(scene, &layout);
+        let mut staging = Vec::new();
+        let device = buffers.make(gpu, cmd, &layout, &mut staging);
+        for buffer in staging {
+            gpu.retire(Retired::Buffer(buffer));
+        }
+        buffers.device = Some(device?);
+        Ok(buffers)
+    }
+
+    /// A stand-in without device, for planning frames of a scene.
+    pub fn plan_only(scene: &Scene) -> Self {
+        Self::without_device(scene, &Layout::new(scene))
+    }
+
+    fn without_device(scene: &Scene, layout: &Layout) -> Self {
+        let image = |format: vk::Format, texels: usize| {
+            let rows = texels.div_ceil(IMAGE_WIDTH).max(1) as u32;
+            // Nothing to hold: a single texel, so that there is something to bind.
+            let width = if texels == 0 { 1 } else { IMAGE_WIDTH as u32 };
+            ImageDesc::new(format, width, rows)
+        };
+        let buffer = |bytes: usize, usage: vk::BufferUsageFlags| (bytes.max(4) as u64, usage);
+        let floats = vk::Format::R32G32B32A32_SFLOAT;
+        let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
+        Self {
+            device: None,
+            sizes: Sizes {
+                buffers: [
+                    buffer(size_of_val(layout.vertices.as_slice()), vertex),
+                    buffer(size_of_val(layout.mask_uvs.as_slice()), vertex),
+                    buffer(
+                        size_of_val(layout.indices.as_slice()),
+                        vk::BufferUsageFlags::INDEX_BUFFER,
+                    ),
+                ],
+                images: [
+                    image(floats, layout.triangles.len()),
+                    image(floats, layout.triangle_uvs.len()),
+                    image(floats, layout.materials.len()),
+                    image(vk::Format::R8G8B8A8_SRGB, layout.texels.len()),
+                ],
+            },
+            draws: layout.draws.clone(),
+            bounds: scene.bounds,
+            triangles: layout.indices.len() / 3,
+            degenerate: layout.degenerate,
+            masked: !layout.mask_uvs.is_empty(),
+            textured: layout.triangle_uvs.len() / 2,
+            shiny: scene
+                .materials
+                .iter()
+                .any(|m| m.roughness < 1.0 || m.metallic > 0.0),
+        }
+    }
+
+    fn make(
+        &self,
+        gpu: &mut Gpu,
+        cmd: vk::CommandBuffer,
+        layout: &Layout,
+        staging: &mut Vec<Buffer>,
+    ) -> Result<DeviceBuffers, UploadError> {
+        let mut made = DeviceBuffers {
+            buffers: Vec::with_capacity(BUFFERS),
+            images: Vec::with_capacity(IMAGES),
+        };
+        let result = self.fill(gpu, cmd, layout, staging, &mut made);
+        match result {
+            Ok(()) => Ok(made),
+            Err(error) => {
+                // Commands that use them may have been recorded.
+                let DeviceBuffers { buffers, images } = made;
+                buffers
+                    .into_iter()
+                    .for_each(|b| gpu.retire(Retired::Buffer(b)));
+                images
+                    .into_iter()
+                    .for_each(|i| gpu.retire(Retired::Image(i)));
+                Err(error)
+            }
+        }
+    }
+
+    fn fill(
+        &self,
+        gpu: &mut Gpu,
+        cmd: vk::CommandBuffer,
+        layout: &Layout,
+        staging: &mut Vec<Buffer>,
+        made: &mut DeviceBuffers,
+    ) -> Result<(), UploadError> {
+        let mut graph = Graph::new();
+        let buffers: [(&str, &[u8]); BUFFERS] = [
+            ("scene vertices", bytemuck::cast_slice(&layout.vertices)),
+            ("scene mask uvs", bytemuck::cast_slice(&layout.mask_uvs)),
+            ("scene indices", bytemuck::cast_slice(&layout.indices)),
+        ];
+        for ((name, bytes), (size, usage)) in buffers.into_iter().zip(self.sizes.buffers) {
+            let usage = usage | vk::BufferUsageFlags::TRANSFER_DST;
+            let buffer = gpu.create_buffer(name, size, usage, MemoryLocation::GpuOnly)?;
+            let uploaded = upload_buffer(gpu, &mut graph, &buffer, bytes, staging);
+            made.buffers.push(buffer);
+            uploaded?;
+        }
+        let images: [(&str, &[u8]); IMAGES] = [
+            ("scene triangles", bytemuck::cast_slice(&layout.triangles)),
+            (
+                "scene triangle uvs",
+                bytemuck::cast_slice(&layout.triangle_uvs),
+            ),
+            ("scene materials", bytemuck::cast_slice(&layout.materials)),
+            ("scene texels", bytemuck::cast_slice(&layout.texels)),
+        ];
+        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+        for ((name, bytes), desc) in images.into_iter().zip(self.sizes.images) {
+            let spec = ImageSpec::new_2d(desc.format, desc.width, desc.height, usage);
+            let image = gpu.create_image(name, &spec)?;
+            let uploaded = upload_image(gpu, &mut graph, &image, desc, bytes, staging);
+            made.images.push(image);
+            uploaded?;
+        }
+        let compiled = graph.compile(gpu)?;
+        let mut cache = FrameCache::new();
+        let recorded = compiled.record(gpu, &mut cache, cmd);
+        cache.destroy(gpu);
+        recorded?;
+        Ok(())
+    }
+
+    /// Destroys everything; no frame may still use it.
+    pub fn destroy(self, gpu: &mut Gpu) {
+        if let Some(device) = self.device {
+            device
+                .buffers
+                .into_iter()
+                .for_each(|b| gpu.destroy_buffer(b));
+            device.images.into_iter().for_each(|i| gpu.destroy_image(i));
+        }
+    }
+
+    /// Gives everything back once no frame can still use it.
+    pub fn retire(self, gpu: &mut Gpu) {
+        if let Some(device) = self.device {
+            let buffers = device.buffers.into_iter().map(Retired::Buffer);
+            let images = device.images.into_iter().map(Retired::Image);
+            buffers.chain(images).for_each(|it| gpu.retire(it));
+        }
+    }
+
+    /// Chunks of neighbouring triangles, masked ones first.
+    pub fn draws(&self) -> &[Draw] {
+        &self.draws
+    }
+
+    /// Box around all vertices, scene space.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Number of triangles with area.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles
+    }
+
+    /// Whether any triangle has holes.
+    pub fn has_masks(&self) -> bool {
+        self.masked
+    }
+
+    /// Number of triangles without area or cut out as a whole, which are left out.
+    pub fn degenerate_count(&self) -> usize {
+        self.degenerate
+    }
+
+    /// Number of triangles with texture coordinates, which come before all others.
+    pub fn textured_triangle_count(&self) -> usize {
+        self.textured
+    }
+
+    /// Whether any surface reflects light more to one side than to others.
+    pub fn is_shiny(&self) -> bool {
+        self.shiny
+    }
+
+    /// Vertex input of positions at location 0 and triangle numbers at location 1.
+    pub fn id_stream(&self) -> crate::gpu::VertexStream {
+        let offset = core::mem::offset_of!(Vertex, triangle) as u32;
+        crate::gpu::VertexStream {
+            stride: size_of::<Vertex>() as u32,
+            attributes: vec![
+                (0, vk::Format::R32G32B32_SFLOAT, 0),
+                (1, vk::Format::R32_UINT, offset),
+            ],
+            per_instance: false,
+        }
+    }
+
+    /// Vertex input of texture coordinates at location 2.
+    pub fn mask_stream(&self) -> crate::gpu::VertexStream {
+        crate::gpu::VertexStream {
+            stride: size_of::<[f32; 2]>() as u32,
+            attributes: vec![(2, vk::Format::R32G32_SFLOAT, 0)],
+            per_instance: false,
+        }
+    }
+
+    /// Brings the scene's resources into a graph.
+    pub fn import(&self, graph: &mut Graph<'_>) -> SceneIds {
+        let device = self.device.as_ref();
+        let mut buffer = |name: &str, index: usize| {
+            let (size, usage) = self.sizes.buffers[index];
+            let raw = device.and_then(|device| device.buffers.get(index));
+            let host = HostBuffer {
+                buffer: raw.map_or_else(Default::default, |buffer| buffer.raw),
+                desc: BufferDesc { size },
+                usage,
+                enter: BufferState::IDLE,
+                leave: BufferState::IDLE,
+            };
+            graph.import_buffer(name.to_string(), host)
+        };
+        let vertices = buffer("scene.vertices", 0);
+        let mask_uvs = buffer("scene.mask_uvs", 1);
+        let indices = buffer("scene.indices", 2);
+        let mut image = |name: &str, index: usize| {
+            let raw = device.and_then(|device| device.images.get(index));
+            let host = HostImage {
+                image: raw.map_or_else(Default::default, |image| image.raw),
+                desc: self.sizes.images[index],
+                usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+                enter: STATIC,
+                leave: STATIC,
+            };
+            graph.import_image(name.to_string(), host)
+        };
+        SceneIds {
+            vertices,
+            mask_uvs,
+            indices,
+            triangles: image("scene.triangles", 0),
+            triangle_uvs: image("scene.triangle_uvs", 1),
+            materials: image("scene.materials", 2),
+            texels: image("scene.texels", 3),
+        }
+    }
+}
+
+/// State of the scene's images between frames: the upload made them visible to every stage that
+/// reads them, and nobody writes them, so nobody waits.
+const STATIC: ImageState = ImageState {
+    layout: vk::ImageLayout::READ_ONLY_OPTIMAL,
+    stages: vk::PipelineStageFlags2::NONE,
+    access: vk::AccessFlags2::NONE,
+};
+
+/// Brings `bytes`, filled up with zeros to `size`, to a buffer that copies can be made from.
+fn stage(
+    gpu: &mut Gpu,
+    graph: &mut Graph<'_>,
+    bytes: &[u8],
+    size: usize,
+    staging: &mut Vec<Buffer>,
+) -> Result<Option<BufferId>, GpuError> {
+    if size == 0 {
+        return Ok(None);
+    }
+    let size = size as u64;
+    let usage = vk::BufferUsageFlags::TRANSFER_SRC;
+    let mut buffer = gpu.create_buffer("upload", size, usage, MemoryLocation::CpuToGpu)?;
+    let mapped = buffer.mapped_mut().map(|target| {
+        let (data, padding) = target.split_at_mut(bytes.len());
+        data.copy_from_slice(bytes);
+        padding.fill(0);
+    });
+    let raw = buffer.raw;
+    staging.push(buffer);
+    if mapped.is_none() {
+        return Err(GpuError::Invalid {
+            object: "upload".to_string(),
+            problem: "its memory is not visible to the host".to_string(),
+        });
+    }
+    let host = HostBuffer {
+        buffer: raw,
+        desc: BufferDesc { size },
+        usage,
+        enter: BufferState::IDLE,
+        leave: BufferState::IDLE,
+    };
+    Ok(Some(graph.import_buffer("upload", host)))
+}
+
+fn upload_buffer(
+    gpu: &mut Gpu,
+    graph: &mut Graph<'_>,
+    target: &Buffer,
+    bytes: &[u8],
+    staging: &mut Vec<Buffer>,
+) -> Result<(), GpuError> {
+    let size = bytes.len() as u64;
+    let Some(source) = stage(gpu, graph, bytes, bytes.len(), staging)? else {
+        return Ok(());
+    };
+    let host = HostBuffer {
+        buffer: target.raw,
+        desc: BufferDesc { size: target.size },
+        usage: target.usage,
+        enter: BufferState::IDLE,
+        leave: BufferState {
+            stages: vk::PipelineStageFlags2::VERTEX_INPUT,
+            access: vk::AccessFlags2::from_raw(
+                vk::AccessFlags2::VERTEX_ATTRIBUTE_READ.as_raw()
+                    | vk::AccessFlags2::INDEX_READ.as_raw(),
+            ),
+        },
+    };
+    let target = graph.import_buffer("scene", host);
+    let mut pass = graph.pass("upload", PassKind::Transfer);
+    pass.read(source, Access::CopyRead);
+    let target = pass.write(target, Access::CopyWrite);
+    pass.record(move |ctx| ctx.copy_buffer(source, 0, target, 0, size));
+    Ok(())
+}
+
+fn upload_image(
+    gpu: &mut Gpu,
+    graph: &mut Graph<'_>,
+    target: &Image,
+    desc: ImageDesc,
+    texels: &[u8],
+    staging: &mut Vec<Buffer>,
+) -> Result<(), GpuError> {
+    let texel_bytes = if desc.format == vk::Format::R8G8B8A8_SRGB {
+        4
+    } else {
+        16
+    };
+    let size = desc.width as usize * desc.height as usize * texel_bytes;
+    let Some(source) = stage(gpu, graph, texels, size, staging)? else {
+        return Ok(());
+    };
+    let host = HostImage {
+        image: target.raw,
+        desc,
+        usage: target.spec.usage,
+        enter: ImageState::UNDEFINED,
+        leave: ImageState {
+            stages: vk::PipelineStageFlags2::from_raw(
+                vk::PipelineStageFlags2::FRAGMENT_SHADER.as_raw()
+                    | vk::PipelineStageFlags2::COMPUTE_SHADER.as_raw(),
+            ),
+            access: vk::AccessFlags2::SHADER_SAMPLED_READ,
+            ..STATIC
+        },
+    };
+    let target = graph.import_image("scene", host);
+    let mut pass = graph.pass("upload", PassKind::Transfer);
+    pass.read(source, Access::CopyRead);
+    let target = pass.overwrite(target, Access::CopyWrite);
+    let part = ImagePart::whole(&desc);
+    pass.record(move |ctx| ctx.copy_buffer_to_image(source, 0, target, part));
+    Ok(())
+}

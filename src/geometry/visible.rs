@@ -28,6 +28,16 @@ pub fn visible_hulls(
         .into_iter()
         .filter(|bounds| !bounds.is_empty())
         .map(|bounds| {
+            // Most boxes of a scene are wholly in view or wholly out of it.
+            let corners = bounds.corners().map(|corner| corner.as_dvec3());
+            let beyond = |plane: &HalfSpace| corners.iter().all(|c| plane.distance(*c) > 0.0);
+            let within = |plane: &HalfSpace| corners.iter().all(|c| plane.distance(*c) <= 0.0);
+            if planes.iter().any(beyond) {
+                return Vec::new();
+            }
+            if planes.iter().all(within) {
+                return corners.to_vec();
+            }
             let mut faces = box_faces(&bounds);
             for plane in &planes {
                 clip(&mut faces, plane);

@@ -83,14 +83,26 @@ pub fn light_views(light: &AreaLight, receivers: &[Vec<DVec3>], casters: &Aabb) 
         let right = forward.cross(up);
         let sides = [right, -right, up, -up].map(|side| forward + side);
         let planes = [forward, sides[0], sides[1], sides[2], sides[3]];
-        let seen = receivers.iter().any(|hull| {
+        let seen = receivers.iter().filter(|hull| {
             let within = |plane: &DVec3| hull.iter().any(|p| (*p - center).dot(*plane) >= 0.0);
             planes.iter().all(within)
         });
-        if seen {
-            let face = [-1.0 - MARGIN; 2];
-            let frame = [right, up, forward];
-            views.push_perspective(center, frame, face, face.map(|v| -v), near);
+        // What is seen, within the face: a hull that reaches behind the light may show anywhere.
+        let mut part: Option<([f64; 2], [f64; 2])> = None;
+        for hull in seen {
+            let (low, high) = extent_on_face(hull, center, [right, up, forward]);
+            if low[0] > high[0] || low[1] > high[1] {
+                continue;
+            }
+            let (a, b) = part.get_or_insert((low, high));
+            for axis in 0..2 {
+                a[axis] = a[axis].min(low[axis]);
+                b[axis] = b[axis].max(high[axis]);
+            }
+        }
+        if let Some((low, high)) = part {
+            let (low, high) = bounds_of([low, high].into_iter());
+            views.push_perspective(center, [right, up, forward], low, high, near);
         }
     }
     views
@@ -105,6 +117,28 @@ const CUBE_FACES: [(DVec3, DVec3); 6] = [
     (DVec3::Z, DVec3::Y),
     (DVec3::NEG_Z, DVec3::Y),
 ];
+
+/// Where a hull may show on a face of the cube, within -1 to 1.
+fn extent_on_face(
+    hull: &[DVec3],
+    center: DVec3,
+    [right, up, forward]: [DVec3; 3],
+) -> ([f64; 2], [f64; 2]) {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for point in hull {
+        let q = *point - center;
+        let z = q.dot(forward);
+        if z <= 1.0e-6 * q.length() {
+            return ([-1.0; 2], [1.0; 2]);
+        }
+        let at = [q.dot(right) / z, q.dot(up) / z];
+        for axis in 0..2 {
+            low[axis] = low[axis].min(at[axis]);
+            high[axis] = high[axis].max(at[axis]);
+        }
+    }
+    (low.map(|v| v.max(-1.0)), high.map(|v| v.min(1.0)))
+}
 
 /// Two unit vectors that form a frame with `forward`, turned with the light.
 fn axes_across(forward: DVec3, light: &AreaLight) -> (DVec3, DVec3) {

@@ -185,7 +185,7 @@ fn a_host_records_the_same_frame() {
                 .collect();
             assert_eq!(
                 culled,
-                ["frame.params", "shade.base", "shade.light lamp"],
+                ["shade.base", "shade.light lamp"],
                 "nobody asked for the picture"
             );
             compiled.record(&mut gpu, &mut cache, cmd).unwrap();

@@ -146,7 +146,7 @@ fn a_plane_has_the_depth_that_is_predicted_for_it() {
     };
     for shape in [disk, sun] {
         let light = AreaLight::new(shape, above, Vec3::new(0.1, -1.0, 0.2), Vec3::X);
-        let views = light_views(&light, std::slice::from_ref(&hull), &bounds);
+        let views = light_views(&light, std::slice::from_ref(&hull), &bounds, 0.0);
         let (view, clip) = (views.views[0], views.clip_from_scene[0]);
         let origin = if light.shape.is_sun() {
             Vec3::ZERO

@@ -1,4 +1,4 @@
-//! Drawing the scene's triangle numbers, as cameras and lights see them.
+//! Drawing the scene as cameras and lights see it.
 
 use super::camera::frustum_sees;
 use super::scene_buffers::{Draw, SceneBuffers, SceneIds};
@@ -16,7 +16,7 @@ struct MaskedPush {
     material: u32,
 }
 
-/// Declares what [`draw_ids`] reads.
+/// Declares what [`draw_scene`] reads.
 pub fn read_for_draw(pass: &mut PassBuilder<'_, '_>, scene: &SceneBuffers, ids: &SceneIds) {
     pass.read(ids.vertices, Access::Vertex);
     pass.read(ids.indices, Access::Index);
@@ -27,14 +27,23 @@ pub fn read_for_draw(pass: &mut PassBuilder<'_, '_>, scene: &SceneBuffers, ids: 
     }
 }
 
-/// Draws all triangles that a view may see into the pass's R32_UINT colour attachment (triangle
-/// number plus one) and its depth attachment (reversed: cleared to 0, greater is nearer). The pass
-/// has declared [`read_for_draw`].
-pub fn draw_ids(
+/// What a drawing of the scene leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DrawTarget {
+    /// Depth and, in an R32_UINT colour attachment, one more than the number of the triangle.
+    Ids,
+    /// Depth alone.
+    Depth,
+}
+
+/// Draws all triangles that a view may see into the pass's attachments. Depth is reversed: cleared
+/// to 0, greater is nearer. The pass has declared [`read_for_draw`].
+pub fn draw_scene(
     ctx: &mut PassContext<'_>,
     scene: &SceneBuffers,
     ids: &SceneIds,
     clip_from_scene: &Mat4,
+    target: DrawTarget,
 ) -> Result<(), GpuError> {
     let seen = |draw: &&Draw| frustum_sees(clip_from_scene, &draw.bounds);
     let seen: Vec<&Draw> = scene.draws().iter().filter(seen).collect();
@@ -45,9 +54,17 @@ pub fn draw_ids(
     });
     let (masked, solid): (Vec<&Run>, Vec<&Run>) = runs.iter().partition(|run| run.mask.is_some());
     if !solid.is_empty() {
-        let fragment = Some(&spirv::RASTER_IDS_FRAG);
-        let mut pipeline = GraphicsPipelineDesc::new(&spirv::RASTER_IDS_VERT, fragment);
-        pipeline.vertex_layout = vec![scene.id_stream()];
+        let mut pipeline = match target {
+            DrawTarget::Ids => {
+                let fragment = Some(&spirv::RASTER_IDS_FRAG);
+                GraphicsPipelineDesc::new(&spirv::RASTER_IDS_VERT, fragment)
+            }
+            DrawTarget::Depth => GraphicsPipelineDesc::new(&spirv::RASTER_DEPTH_VERT, None),
+        };
+        pipeline.vertex_layout = vec![match target {
+            DrawTarget::Ids => scene.id_stream(),
+            DrawTarget::Depth => scene.position_stream(),
+        }];
         pipeline.depth = depth;
         ctx.bind_graphics(pipeline, &[], bytemuck::bytes_of(clip_from_scene))?;
         ctx.bind_vertices(&[(ids.vertices, 0)])?;
@@ -57,7 +74,10 @@ pub fn draw_ids(
         }
     }
     for run in masked {
-        let fragment = Some(&spirv::RASTER_IDS_MASKED_FRAG);
+        let fragment = Some(match target {
+            DrawTarget::Ids => &spirv::RASTER_IDS_MASKED_FRAG,
+            DrawTarget::Depth => &spirv::RASTER_DEPTH_MASKED_FRAG,
+        });
         let mut pipeline = GraphicsPipelineDesc::new(&spirv::RASTER_IDS_MASKED_VERT, fragment);
         pipeline.vertex_layout = vec![scene.id_stream(), scene.mask_stream()];
         pipeline.depth = depth;

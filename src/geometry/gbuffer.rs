@@ -1,7 +1,7 @@
 //! Which triangle each pixel sees, and the surface there.
 
 use super::camera::PixelCamera;
-use super::draw::{draw_ids, read_for_draw};
+use super::draw::{DrawTarget, draw_scene, read_for_draw};
 use super::scene_buffers::{SceneBuffers, SceneIds};
 use crate::gpu::{GraphicsPipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, Graph, ImageDesc, ImageId, Load, PassKind, Stage};
@@ -43,7 +43,7 @@ pub fn add_gbuffer<'f>(
     // Nobody reads the depth afterwards: the surface pass finds it more exactly.
     let _ = pass.depth(depth, Load::Clear([0.0; 4]));
     let scene_ids = *ids;
-    pass.record(move |ctx| draw_ids(ctx, scene, &scene_ids, &matrix));
+    pass.record(move |ctx| draw_scene(ctx, scene, &scene_ids, &matrix, DrawTarget::Ids));
 
     let view_depth = graph.create_image("gbuffer.view_depth", image(vk::Format::R32_SFLOAT));
     let geometric = graph.create_image("gbuffer.geometric_normal", image(vk::Format::R32_UINT));

@@ -327,6 +327,13 @@ impl SceneBuffers {
         }
     }
 
+    /// Vertex input of positions at location 0.
+    pub fn position_stream(&self) -> crate::gpu::VertexStream {
+        let mut stream = self.id_stream();
+        stream.attributes.truncate(1);
+        stream
+    }
+
     /// Vertex input of texture coordinates at location 2.
     pub fn mask_stream(&self) -> crate::gpu::VertexStream {
         crate::gpu::VertexStream {

@@ -9,17 +9,15 @@
 //! away from the light are settled without a look at the map.
 
 use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
+use super::map::{MAP_SIZE, ShadowMap, add_maps};
+use super::receivers::add_receivers;
 use super::{ShadowInputs, ShadowMask};
-use crate::geometry::{PixelCamera, TileList, draw_ids, read_for_draw, tile_counts};
+use crate::geometry::{DrawTarget, PixelCamera};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, BufferDesc, Graph, ImageDesc, ImagePart, Load, PassKind, Stage};
-use ash::vk;
+use crate::graph::{Access, Bind, BufferDesc, Graph, PassKind, Stage};
 use bytemuck::{Pod, Zeroable};
 
-/// Width and height of each map in texels.
-pub const MAP_SIZE: u32 = 2048;
-
-/// Uniform block of both compute passes: `hard/params.glsl`.
+/// Uniform block of `hard/visibility.comp`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct HardParams {
@@ -37,7 +35,7 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
     let name = &inputs.light_name;
     let light = inputs.light;
     let scene = inputs.scene;
-    let views = light_views(&light, &inputs.receivers, &scene.bounds());
+    let views = light_views(&light, &inputs.receivers, &scene.bounds(), 0.0);
     let [width, height] = inputs.camera.size();
 
     let mut params = HardParams {
@@ -52,71 +50,28 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
     };
     params.views[..views.views.len()].copy_from_slice(&views.views);
 
-    let size = [width, height];
     let buffer = graph.create_buffer(
         format!("hard.params {name}"),
         BufferDesc {
             size: size_of::<HardParams>() as u64,
         },
     );
-    let mut list = TileList::create(graph, &format!("hard.tiles {name}"), size);
     let mut pass = graph.pass(format!("hard.params {name}"), PassKind::Transfer);
     let buffer = pass.overwrite(buffer, Access::Clear);
-    list.clear(&mut pass);
-    let cleared = list;
-    pass.record(move |ctx| {
-        cleared.record_clear(ctx)?;
-        ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params))
-    });
+    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
 
-    // Arrays of at least one layer, so that the shader's bindings always have something: a light
-    // without casters has single texels cleared and never read.
-    let layers = views.views.len().max(1) as u32;
-    let side = if views.views.is_empty() { 1 } else { MAP_SIZE };
-    let image = |format| ImageDesc::new(format, side, side).layers(layers);
-    let depth = image(vk::Format::D32_SFLOAT);
-    let mut map_depth = graph.create_image(format!("hard.map_depth {name}"), depth);
-    let numbers = image(vk::Format::R32_UINT);
-    let mut map_ids = graph.create_image(format!("hard.map_ids {name}"), numbers);
-    for layer in 0..layers {
-        let mut pass = graph.pass(format!("hard.map {name}.{layer}"), PassKind::Graphics);
-        let part = ImagePart::layer(layer);
-        map_ids = pass.color_part(map_ids, part, Load::Clear([0.0; 4]));
-        map_depth = pass.depth_part(map_depth, part, Load::Clear([0.0; 4]));
-        let Some(matrix) = views.clip_from_scene.get(layer as usize).copied() else {
-            continue;
-        };
-        read_for_draw(&mut pass, scene, &inputs.ids);
-        let ids = inputs.ids;
-        pass.record(move |ctx| draw_ids(ctx, scene, &ids, &matrix));
-    }
-
+    let maps = add_maps(graph, inputs, "hard", &views, DrawTarget::Ids);
+    let receivers = add_receivers(graph, inputs, "hard", 0.0);
+    let ShadowMap {
+        depth: map_depth,
+        ids: Some(map_ids),
+    } = maps
+    else {
+        unreachable!("triangle numbers were asked for");
+    };
+    let list = receivers.list;
     let nearest = SamplerDesc::nearest();
     let compute = Access::Sampled(Stage::Compute);
-    let desc = ImageDesc::new(vk::Format::R32_SFLOAT, width, height);
-    let visibility = graph.create_image(format!("visibility {name}"), desc);
-    let tile_bounds = inputs.tile_bounds;
-    let mut pass = graph.pass(format!("hard.tiles {name}"), PassKind::Compute);
-    pass.read(buffer, Access::Uniform(Stage::Compute));
-    pass.read(tile_bounds, compute);
-    list.fill(&mut pass);
-    let visibility = pass.overwrite(visibility, Access::StorageWrite(Stage::Compute));
-    let filled = list;
-    pass.record(move |ctx| {
-        let shader = &spirv::HARD_TILES_COMP;
-        let bindings = [
-            Bind::uniform(0, buffer),
-            Bind::sampled(1, tile_bounds, nearest),
-            Bind::storage_buffer(2, filled.arguments),
-            Bind::storage_image(3, filled.tiles),
-            Bind::storage_image(4, visibility),
-        ];
-        ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
-        let [across, down] = tile_counts(size);
-        ctx.dispatch(shader.groups([across * down, 1, 1]));
-        Ok(())
-    });
-
     let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
     let mut pass = graph.pass(format!("hard.visibility {name}"), PassKind::Compute);
     pass.read(buffer, Access::Uniform(Stage::Compute));
@@ -130,7 +85,7 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
         pass.read(image, compute);
     }
     list.read(&mut pass);
-    let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
+    let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
     let masked = u32::from(scene.has_masks());
     pass.record(move |ctx| {
         let bindings = [

@@ -45,7 +45,16 @@ const MARGIN: f64 = 2.0 / 1024.0;
 /// those faces of a cube that receivers stand before. No receivers, no views.
 ///
 /// A sun's view begins before all of `casters`. Other views begin at the light.
-pub fn light_views(light: &AreaLight, receivers: &[Vec<DVec3>], casters: &Aabb) -> LightViews {
+///
+/// `margin` is how far views reach beyond the receivers, as the tangent of an angle at the light (of
+/// a sun in metres): techniques that look at the neighbourhood of a receiver need it, and 0 is for
+/// those that do not.
+pub fn light_views(
+    light: &AreaLight,
+    receivers: &[Vec<DVec3>],
+    casters: &Aabb,
+    margin: f64,
+) -> LightViews {
     let points: Vec<DVec3> = receivers.iter().flatten().copied().collect();
     let mut views = LightViews {
         views: Vec::new(),
@@ -55,7 +64,7 @@ pub fn light_views(light: &AreaLight, receivers: &[Vec<DVec3>], casters: &Aabb) 
         return views;
     }
     if light.shape.is_sun() {
-        views.push_sun(light, &points, casters);
+        views.push_sun(light, &points, casters, margin);
         return views;
     }
     let center = light.center.as_dvec3();
@@ -75,7 +84,7 @@ pub fn light_views(light: &AreaLight, receivers: &[Vec<DVec3>], casters: &Aabb) 
             let z = q.dot(axis);
             [q.dot(right) / z, q.dot(up) / z]
         });
-        let (low, high) = bounds_of(slopes);
+        let (low, high) = bounds_of(slopes, margin);
         views.push_perspective(center, [right, up, axis], low, high, near);
         return views;
     }
@@ -101,7 +110,7 @@ pub fn light_views(light: &AreaLight, receivers: &[Vec<DVec3>], casters: &Aabb) 
             }
         }
         if let Some((low, high)) = part {
-            let (low, high) = bounds_of([low, high].into_iter());
+            let (low, high) = bounds_of([low, high].into_iter(), margin);
             views.push_perspective(center, [right, up, forward], low, high, near);
         }
     }
@@ -148,8 +157,8 @@ fn axes_across(forward: DVec3, light: &AreaLight) -> (DVec3, DVec3) {
     (right, forward.cross(right))
 }
 
-/// Bounds of points, widened by the margin. Equal bounds get some width.
-fn bounds_of(points: impl Iterator<Item = [f64; 2]>) -> ([f64; 2], [f64; 2]) {
+/// Bounds of points, widened by a margin and some texels. Equal bounds get some width.
+fn bounds_of(points: impl Iterator<Item = [f64; 2]>, margin: f64) -> ([f64; 2], [f64; 2]) {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for point in points {
         for axis in 0..2 {
@@ -160,17 +169,18 @@ fn bounds_of(points: impl Iterator<Item = [f64; 2]>) -> ([f64; 2], [f64; 2]) {
     let longest = (high[0] - low[0]).max(high[1] - low[1]).max(1.0e-6);
     for axis in 0..2 {
         let width = (high[axis] - low[axis]).max(1.0e-3 * longest);
-        low[axis] -= MARGIN * width;
-        high[axis] = high[axis].max(low[axis] + width) + MARGIN * width;
+        high[axis] = low[axis] + width;
+        low[axis] -= MARGIN * width + margin;
+        high[axis] += MARGIN * width + margin;
     }
     (low, high)
 }
 
 impl LightViews {
-    fn push_sun(&mut self, light: &AreaLight, points: &[DVec3], casters: &Aabb) {
+    fn push_sun(&mut self, light: &AreaLight, points: &[DVec3], casters: &Aabb, margin: f64) {
         let forward = light.direction.as_dvec3();
         let (right, up) = axes_across(forward, light);
-        let (low, high) = bounds_of(points.iter().map(|p| [p.dot(right), p.dot(up)]));
+        let (low, high) = bounds_of(points.iter().map(|p| [p.dot(right), p.dot(up)]), margin);
         let casters = casters.corners().map(|corner| corner.as_dvec3());
         let depths = points.iter().chain(&casters).map(|p| p.dot(forward));
         let (near, far) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| {
@@ -270,7 +280,7 @@ mod tests {
 
     fn check_views(light: &AreaLight, casters: &[Aabb], expected: usize) {
         let around = casters.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
-        let views = light_views(light, &hulls(casters), &around);
+        let views = light_views(light, &hulls(casters), &around, 0.0);
         assert_eq!(views.views.len(), expected);
         let origin = if light.shape.is_sun() {
             Vec3::ZERO
@@ -325,9 +335,9 @@ mod tests {
             max: Vec3::new(20.0, -1.0, 20.0),
         };
         check_views(&light, &[floor], 5);
-        assert!(light_views(&light, &[], &floor).views.is_empty());
+        assert!(light_views(&light, &[], &floor, 0.0).views.is_empty());
         assert!(
-            light_views(&light, &hulls(&[floor]), &Aabb::EMPTY)
+            light_views(&light, &hulls(&[floor]), &Aabb::EMPTY, 0.0)
                 .views
                 .is_empty()
         );

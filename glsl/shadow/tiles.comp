@@ -1,14 +1,14 @@
 #version 460
-// Settles the tiles that need no look at the map, and lists the others.
+// Settles the tiles that see nothing, or from whose surfaces no part of the light is above the plane,
+// and lists the others.
 
-#include "common/light_view.glsl"
 #include "common/tiles.glsl"
-#include "hard/params.glsl"
+#include "common/view_params.glsl"
 
 layout(local_size_x = 64) in;
 
-layout(set = 0, binding = 0, std140) uniform HardBlock {
-    HardParams params;
+layout(set = 0, binding = 0, std140) uniform ViewBlock {
+    ViewParams view;
 };
 layout(set = 0, binding = 1) uniform sampler2D tile_bounds;
 layout(set = 0, binding = 2, std430) buffer Arguments {
@@ -17,12 +17,16 @@ layout(set = 0, binding = 2, std430) buffer Arguments {
 layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2D list;
 layout(set = 0, binding = 4, r32f) uniform writeonly image2D visibility;
 
+layout(push_constant) uniform Push {
+    uvec2 size;    // of the picture, pixels
+    float reach_m; // from the light's centre to its farthest point (of a sun: at distance 1)
+} push;
+
 // Room for rounding, as a part of the distance to the light.
 const float SLACK = 1.0e-4;
 
 void main() {
-    uvec2 size = params.counts.zw;
-    uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
+    uvec2 tiles = (push.size + TILE_SIZE - 1u) / TILE_SIZE;
     uint index = gl_GlobalInvocationID.x;
     if (index >= tiles.x * tiles.y) {
         return;
@@ -35,9 +39,8 @@ void main() {
     bool empty = bounds.farthest == 0.0;
     bool turned_away = bounds.all_hit;
     for (uint corner = 0u; corner < 8u; ++corner) {
-        vec3 p = tile_corner(params.camera, tile, bounds, corner);
-        vec3 to_light = params.light.w == 0.0 ? params.light.xyz : params.light.xyz - p;
-        float most = most_along(bounds.normal_low, bounds.normal_high, to_light);
+        vec3 to_light = light_offset(view.light, tile_corner(view.camera, tile, bounds, corner));
+        float most = most_along(bounds.normal_low, bounds.normal_high, to_light) + push.reach_m;
         turned_away = turned_away && most < -SLACK * length(to_light);
     }
     if (empty || turned_away) {

@@ -1,0 +1,28 @@
+#version 460
+// Nothing but holes where alpha cuts them.
+
+#include "common/materials.glsl"
+
+layout(set = 0, binding = 0) uniform sampler2D materials;
+layout(set = 0, binding = 1) uniform sampler2D texels;
+
+layout(push_constant) uniform Push {
+    mat4 clip_from_scene;
+    uint material;
+} push;
+
+layout(location = 1) in vec2 surface_uv;
+
+vec4 fetch_material_texel(ivec2 place) {
+    return texelFetch(materials, place, 0);
+}
+
+vec4 fetch_texture_texel(ivec2 place) {
+    return texelFetch(texels, place, 0);
+}
+
+void main() {
+    if (is_hole(push.material, surface_uv)) {
+        discard;
+    }
+}

@@ -1,0 +1,310 @@
+//! The techniques by name, with their options.
+//!
+//! A new technique adds its module, one variant here with its arms, and its folder of shaders.
+
+use super::pcss::PcssOptions;
+use super::{ShadowInputs, ShadowMask, hard, pcss};
+use crate::graph::Graph;
+use crate::light::{AreaLight, ShapeKind};
+
+/// How visibility is found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Technique {
+    /// One shadow map from the light's centre: no penumbra.
+    Hard,
+    /// A filter of fixed size over a shadow map.
+    Pcf(PcssOptions),
+    /// A filter over a shadow map as wide as the light looks through the blockers' mean depth.
+    Pcss(PcssOptions),
+}
+
+/// One option of a technique.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TechniqueOption {
+    /// The key in `NAME:key=value`.
+    pub name: &'static str,
+    /// Value without it.
+    pub default: &'static str,
+    /// Values it takes.
+    pub values: &'static str,
+    /// What it does.
+    pub what: &'static str,
+}
+
+/// Why a text names no technique.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TechniqueError {
+    /// No technique of that name.
+    #[error("unknown technique `{name}`; there is {known}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// All names.
+        known: String,
+    },
+    /// The technique has no such option.
+    #[error("technique `{technique}` has no option `{option}`; {known}")]
+    UnknownOption {
+        /// The technique.
+        technique: &'static str,
+        /// The option asked for.
+        option: String,
+        /// What there is instead.
+        known: String,
+    },
+    /// A value that the option does not take.
+    #[error("technique `{technique}`: option `{option}` is `{value}`; it takes {values}")]
+    Value {
+        /// The technique.
+        technique: &'static str,
+        /// The option.
+        option: &'static str,
+        /// The value given.
+        value: String,
+        /// Values it takes.
+        values: &'static str,
+    },
+    /// The technique cannot do this light.
+    #[error("technique `{technique}` cannot do a {shape} light; it does {known}")]
+    Shape {
+        /// The technique.
+        technique: &'static str,
+        /// The light's shape.
+        shape: ShapeKind,
+        /// Shapes that it can do.
+        known: String,
+    },
+}
+
+const TAPS: TechniqueOption = TechniqueOption {
+    name: "taps",
+    default: "32",
+    values: "1 to 256",
+    what: "texels of the map that a pixel's filter looks at",
+};
+const SEARCH: TechniqueOption = TechniqueOption {
+    name: "search",
+    default: "16",
+    values: "1 to 256",
+    what: "texels of the map that the search for blockers looks at",
+};
+const RADIUS: TechniqueOption = TechniqueOption {
+    name: "radius",
+    default: "2.5",
+    values: "0 to 64",
+    what: "radius of the filter in texels",
+};
+const PATTERN: TechniqueOption = TechniqueOption {
+    name: "pattern",
+    default: "noise",
+    values: "noise (turned from pixel to pixel by interleaved gradient noise) or fixed",
+    what: "how taps lie from pixel to pixel",
+};
+
+impl Technique {
+    /// All techniques, with default options.
+    pub const ALL: &[Self] = &[
+        Self::Hard,
+        Self::Pcf(PcssOptions {
+            search: 0,
+            ..PcssOptions::DEFAULT
+        }),
+        Self::Pcss(PcssOptions::DEFAULT),
+    ];
+
+    /// The name on the command line and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hard => "hard",
+            Self::Pcf(_) => "pcf",
+            Self::Pcss(_) => "pcss",
+        }
+    }
+
+    /// One line on what it does.
+    pub fn summary(self) -> &'static str {
+        match self {
+            Self::Hard => "a shadow map from the light's centre, decided by the triangles it saw",
+            Self::Pcf(_) => "a shadow map, filtered over an area of fixed size",
+            Self::Pcss(_) => {
+                "a shadow map, filtered over what the light covers at the blockers' mean distance"
+            }
+        }
+    }
+
+    /// Where it was published.
+    pub fn paper(self) -> Option<&'static str> {
+        Some(match self {
+            Self::Hard => "L. Williams: Casting Curved Shadows on Curved Surfaces. SIGGRAPH 1978",
+            Self::Pcf(_) => {
+                "W. Reeves, D. Salesin, R. Cook: Rendering Antialiased Shadows with Depth Maps. \
+                 SIGGRAPH 1987"
+            }
+            Self::Pcss(_) => "R. Fernando: Percentage-Closer Soft Shadows. SIGGRAPH 2005 Sketches",
+        })
+    }
+
+    /// Light shapes that it can do.
+    pub fn shapes(self) -> &'static [ShapeKind] {
+        match self {
+            Self::Hard | Self::Pcf(_) | Self::Pcss(_) => &ShapeKind::ALL,
+        }
+    }
+
+    /// Its options.
+    pub fn options(self) -> &'static [TechniqueOption] {
+        match self {
+            Self::Hard => &[],
+            Self::Pcf(_) => &[TAPS, RADIUS, PATTERN],
+            Self::Pcss(_) => &[TAPS, SEARCH, PATTERN],
+        }
+    }
+
+    /// The values of its options, in the order of [`options`](Self::options).
+    pub fn option_values(self) -> Vec<(&'static str, String)> {
+        let pattern = |o: &PcssOptions| if o.rotated { "noise" } else { "fixed" }.to_string();
+        let values = match &self {
+            Self::Hard => Vec::new(),
+            Self::Pcf(o) => vec![o.taps.to_string(), o.radius.to_string(), pattern(o)],
+            Self::Pcss(o) => vec![o.taps.to_string(), o.search.to_string(), pattern(o)],
+        };
+        let names = self.options().iter().map(|option| option.name);
+        names.zip(values).collect()
+    }
+
+    /// Sets an option that it has; `None` for a value that the option does not take.
+    fn set(&mut self, option: &str, value: &str) -> Option<()> {
+        let count = || value.parse::<u32>().ok().filter(|n| (1..=256).contains(n));
+        match (self, option) {
+            (Self::Pcf(o) | Self::Pcss(o), "taps") => o.taps = count()?,
+            (Self::Pcss(o), "search") => o.search = count()?,
+            (Self::Pcf(o), "radius") => {
+                let radius = value.parse::<f32>().ok();
+                o.radius = radius.filter(|r| (0.0..=64.0).contains(r))?;
+            }
+            (Self::Pcf(o) | Self::Pcss(o), "pattern") => {
+                o.rotated = match value {
+                    "noise" => true,
+                    "fixed" => false,
+                    _ => return None,
+                }
+            }
+            _ => return None,
+        }
+        Some(())
+    }
+
+    /// Refuses a light that the technique cannot do.
+    ///
+    /// # Errors
+    /// [`TechniqueError::Shape`], which names the shapes that it can do.
+    pub fn check(self, light: &AreaLight) -> Result<(), TechniqueError> {
+        let shape = light.shape.kind();
+        if self.shapes().contains(&shape) {
+            return Ok(());
+        }
+        let names: Vec<&str> = self.shapes().iter().map(|shape| shape.name()).collect();
+        Err(TechniqueError::Shape {
+            technique: self.name(),
+            shape,
+            known: names.join(", "),
+        })
+    }
+
+    /// Declares the passes that make one light's visibility.
+    pub fn add_passes<'f>(self, graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -> ShadowMask {
+        match self {
+            Self::Hard => hard::add_passes(graph, inputs),
+            Self::Pcf(options) | Self::Pcss(options) => {
+                pcss::add_passes(graph, inputs, self.name(), options)
+            }
+        }
+    }
+}
+
+impl std::str::FromStr for Technique {
+    type Err = TechniqueError;
+
+    /// Reads `NAME[:key=value,..]`.
+    fn from_str(text: &str) -> Result<Self, TechniqueError> {
+        let (name, options) = text.split_once(':').unwrap_or((text, ""));
+        let found = Self::ALL.iter().copied().find(|t| t.name() == name);
+        let Some(mut technique) = found else {
+            let names: Vec<&str> = Self::ALL.iter().map(|t| t.name()).collect();
+            return Err(TechniqueError::Unknown {
+                name: name.to_string(),
+                known: names.join(", "),
+            });
+        };
+        for option in options.split(',').filter(|option| !option.is_empty()) {
+            let (key, value) = option.split_once('=').unwrap_or((option, ""));
+            let known = technique.options();
+            let Some(option) = known.iter().find(|option| option.name == key) else {
+                let names: Vec<&str> = known.iter().map(|option| option.name).collect();
+                return Err(TechniqueError::UnknownOption {
+                    technique: technique.name(),
+                    option: key.to_string(),
+                    known: if names.is_empty() {
+                        "it has none".to_string()
+                    } else {
+                        format!("it has {}", names.join(", "))
+                    },
+                });
+            };
+            if technique.set(key, value).is_none() {
+                return Err(TechniqueError::Value {
+                    technique: technique.name(),
+                    option: option.name,
+                    value: value.to_string(),
+                    values: option.values,
+                });
+            }
+        }
+        Ok(technique)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_name_techniques_and_options() {
+        let parsed = "pcss:taps=64,pattern=fixed".parse::<Technique>();
+        let Ok(Technique::Pcss(options)) = parsed else {
+            panic!("{parsed:?}");
+        };
+        assert_eq!(
+            (options.taps, options.search, options.rotated),
+            (64, 16, false)
+        );
+        for (text, wanted) in [
+            ("soft", "unknown technique `soft`; there is hard, pcf, pcss"),
+            ("hard:taps=1", "`hard` has no option `taps`; it has none"),
+            ("pcf:search=1", "it has taps, radius, pattern"),
+            ("pcss:taps=0", "option `taps` is `0`; it takes 1 to 256"),
+            ("pcss:taps", "option `taps` is ``"),
+            ("pcf:radius=nan", "it takes 0 to 64"),
+        ] {
+            match text.parse::<Technique>() {
+                Ok(technique) => panic!("{text}: {technique:?}"),
+                Err(error) => assert!(error.to_string().contains(wanted), "{error}"),
+            }
+        }
+    }
+
+    #[test]
+    fn defaults_are_what_options_say() {
+        for &technique in Technique::ALL {
+            let values = technique.option_values();
+            assert_eq!(values.len(), technique.options().len());
+            for (option, (name, value)) in technique.options().iter().zip(values) {
+                assert_eq!((option.name, option.default), (name, value.as_str()));
+                let text = format!("{}:{name}={value}", technique.name());
+                assert_eq!(text.parse(), Ok(technique));
+            }
+        }
+    }
+}

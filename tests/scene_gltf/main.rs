@@ -5,11 +5,17 @@
 #[path = "../../examples/make_assets.rs"]
 mod make_assets;
 
+mod animation;
 mod assets;
 mod broken;
+mod figures;
+mod heap;
+mod large;
 mod lights;
 mod meshes;
+mod model;
 mod mutated;
+mod textures;
 
 use antumbra::scene::{LoadOptions, Scene, SceneError};
 use glam::Vec3;

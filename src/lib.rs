@@ -37,6 +37,11 @@
 
 #![warn(missing_docs)]
 
+// The README's example is compiled as a test.
+#[cfg(all(doctest, feature = "cli"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub use ash;
 
 pub mod capture;
@@ -46,6 +51,10 @@ pub mod geometry;
 pub mod gpu;
 pub mod graph;
 pub mod light;
+#[cfg(feature = "cli")]
+pub mod measure;
+#[cfg(feature = "cli")]
+pub mod reference;
 pub mod renderer;
 pub mod scene;
 pub mod shadow;

@@ -1,138 +1,126 @@
-//! `hard` against the exact shadow of the light's centre, cast ray by ray on the CPU in f64.
+//! `hard` against the exact shadow of the light's centre, cast ray by ray on the CPU, on every scene
+//! of `assets/`.
 
 mod support;
 
 use antumbra::capture::{FrameRenderer, FrameRequest};
-use antumbra::light::AreaLight;
-use antumbra::scene::{LoadOptions, Scene, SceneCamera};
+use antumbra::reference::{Reference, Sampling, Settings};
+use antumbra::scene::{LoadOptions, Scene};
 use antumbra::shadow::Technique;
-use glam::{DVec3, UVec2};
 use std::path::Path;
 
-const SIZE: u32 = 128;
+const SIZE: [u32; 2] = [512; 2];
 
-fn load(name: &str) -> Scene {
+/// Least part of the valid pixels that must be right: where a texel's width of edge is a large share
+/// of the picture, it is less.
+fn least_right(name: &str) -> f64 {
+    match name {
+        "fences.gltf" | "foliage.glb" => 0.98,
+        _ => 0.995,
+    }
+}
+
+/// Whether the truth changes within `reach` pixels of one.
+fn near_an_edge(truth: &[f32], pixel: usize, reach: i64) -> bool {
+    let [width, height] = SIZE.map(i64::from);
+    let (x, y) = (pixel as i64 % width, pixel as i64 / width);
+    let around = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (x + dx, y + dy)));
+    around
+        .filter(|(x, y)| (0..width).contains(x) && (0..height).contains(y))
+        .any(|(x, y)| truth[(y * width + x) as usize] != truth[pixel])
+}
+
+fn check(name: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("assets")
         .join(name);
-    Scene::load(&path, &LoadOptions::default()).unwrap()
-}
-
-/// All triangles of a scene.
-struct Tracer(Vec<[DVec3; 3]>);
-
-impl Tracer {
-    fn new(scene: &Scene) -> Self {
-        let corners = |p: &antumbra::scene::Primitive| {
-            let point = |i: &u32| p.positions[*i as usize].as_dvec3();
-            let triangles = p.indices.chunks_exact(3);
-            triangles
-                .map(|t| [point(&t[0]), point(&t[1]), point(&t[2])])
-                .collect::<Vec<_>>()
-        };
-        Self(scene.primitives.iter().flat_map(corners).collect())
-    }
-
-    /// Distance along the ray, in lengths of `direction`, and number of the triangle met first.
-    fn first(
-        &self,
-        origin: DVec3,
-        direction: DVec3,
-        most: f64,
-        own: usize,
-    ) -> Option<(f64, usize)> {
-        let mut nearest = None;
-        let mut limit = most;
-        for (index, [a, b, c]) in self.0.iter().enumerate() {
-            let (ab, ac) = (*b - *a, *c - *a);
-            let h = direction.cross(ac);
-            let det = ab.dot(h);
-            let s = origin - *a;
-            let q = s.cross(ab);
-            let (u, v, t) = (s.dot(h) / det, direction.dot(q) / det, ac.dot(q) / det);
-            let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
-            if index != own && inside && t > 0.0 && t < limit {
-                limit = t;
-                nearest = Some((t, index));
-            }
-        }
-        nearest
-    }
-}
-
-/// What the centre's visibility should be at each pixel; `None` where nothing is hit, where the
-/// light is on or below the surface, and where primary rays graze an edge between surfaces, which
-/// rasterisation may give to either.
-fn truth(scene: &Scene, camera: &SceneCamera, light: &AreaLight) -> Vec<Option<f32>> {
-    let tracer = Tracer::new(scene);
-    let pixels = (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| UVec2::new(x, y)));
-    pixels
-        .map(|pixel| {
-            let ray = camera.ray(pixel, UVec2::splat(SIZE));
-            let (eye, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
-            let (t, own) = tracer.first(eye, direction, f64::INFINITY, usize::MAX)?;
-            let point = eye + direction * t;
-            let [a, b, c] = tracer.0[own];
-            let normal = (b - a).cross(c - a);
-            let normal = if normal.dot(direction) > 0.0 {
-                -normal
-            } else {
-                normal
-            };
-            let (to_light, most) = if light.shape.is_sun() {
-                (-light.direction.as_dvec3(), f64::INFINITY)
-            } else {
-                (light.center.as_dvec3() - point, 1.0)
-            };
-            if normal.dot(to_light) <= 0.0 {
-                return None;
-            }
-            let blocked = tracer.first(point, to_light, most, own).is_some();
-            Some(if blocked { 0.0 } else { 1.0 })
-        })
-        .collect()
-}
-
-/// Part of the pixels with a truth where `hard` says something else.
-fn wrong_part(name: &str) -> f64 {
-    let scene = load(name);
+    let scene = Scene::load(&path, &LoadOptions::default()).unwrap();
     let camera = scene.select_camera(None).unwrap();
     let request = FrameRequest {
         camera: camera.clone(),
-        size: [SIZE; 2],
-        lights: vec![0],
+        size: SIZE,
+        lights: (0..scene.lights.len()).collect(),
         technique: Technique::Hard,
     };
-    let _one = support::serial();
     let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
     let frame = renderer.render(&request).unwrap();
     support::assert_no_messages(&renderer.destroy().unwrap());
-    let truth = truth(&scene, &camera, &scene.lights[0].light);
-    let pairs = truth.iter().zip(&frame.lights[0].visibility);
-    let known: Vec<(f32, f32)> = pairs.filter_map(|(t, v)| t.map(|t| (t, *v))).collect();
-    let dark = known.iter().filter(|(t, _)| *t == 0.0).count();
-    assert!(
-        dark > 100 && dark < known.len() - 100,
-        "{name} has light and shadow"
-    );
-    let wrong = known.iter().filter(|(t, v)| t != v).count();
-    println!("{name}: {wrong} of {} pixels wrong", known.len());
-    wrong as f64 / known.len() as f64
-}
-
-#[test]
-fn hard_shadows_are_where_they_belong() {
-    for name in [
-        "sphere_over_plane.gltf",
-        "poles.gltf",
-        "blockers.gltf",
-        "sun_court.glb",
-    ] {
-        let wrong = wrong_part(name);
+    let reference = Reference::new(&scene).unwrap();
+    for (captured, scene_light) in frame.lights.iter().zip(&scene.lights) {
+        let light = &scene_light.light;
+        let settings = Settings {
+            camera: &camera,
+            size: SIZE,
+            light,
+            sampling: &Sampling::Plain { samples: 1 },
+        };
+        let valid = reference.render(&settings, &|_| {}).unwrap().valid;
+        let truth = reference.center_visibility(&camera, SIZE, light).unwrap();
+        let pixels = (0..truth.len()).filter(|pixel| valid[*pixel]);
+        let (mut count, mut dark, mut wrong) = (0, 0, Vec::new());
+        for pixel in pixels {
+            count += 1;
+            dark += usize::from(truth[pixel] == 0.0);
+            if truth[pixel] != captured.visibility[pixel] {
+                wrong.push(pixel);
+            }
+        }
+        let stray = wrong
+            .iter()
+            .filter(|p| !near_an_edge(&truth, **p, 2))
+            .count();
+        let right = 1.0 - wrong.len() as f64 / f64::from(count.max(1));
+        let title = format!("{name}, light `{}`", scene_light.name);
+        println!(
+            "{title}: {:.3} % of {count} valid pixels right, {dark} in shadow, {} wrong, {stray} of \
+             them more than 2 pixels from a shadow's edge",
+            100.0 * right,
+            wrong.len()
+        );
+        assert!(count > 20_000, "{title}: there is something to measure");
+        assert!(right >= least_right(name), "{title}: {right}");
+        let few = (0.05 * wrong.len() as f64).max(8.0);
         assert!(
-            wrong <= 0.001,
-            "{name}: {:.3} % of the pixels are wrong",
-            100.0 * wrong
+            stray as f64 <= few,
+            "{title}: {stray} of {} wrong pixels",
+            wrong.len()
         );
     }
+}
+
+macro_rules! scenes {
+    ($($test:ident: $file:literal,)*) => {
+        $(#[test]
+        fn $test() {
+            let _one = support::serial();
+            check($file);
+        })*
+
+        #[test]
+        fn every_scene_is_here() {
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
+            for entry in std::fs::read_dir(folder).unwrap() {
+                let name = entry.unwrap().file_name().into_string().unwrap();
+                if name.ends_with(".gltf") || name.ends_with(".glb") {
+                    assert!([$($file),*].contains(&name.as_str()), "{name}");
+                }
+            }
+        }
+    };
+}
+
+scenes! {
+    blockers: "blockers.gltf",
+    comb: "comb.gltf",
+    far_away: "far_away.gltf",
+    fences: "fences.gltf",
+    figure: "figure.glb",
+    foliage: "foliage.glb",
+    lights: "lights.gltf",
+    mirrored: "mirrored.gltf",
+    poles: "poles.gltf",
+    room: "room.glb",
+    sphere_over_plane: "sphere_over_plane.gltf",
+    sun_court: "sun_court.glb",
+    tube: "tube.gltf",
 }

@@ -1,8 +1,9 @@
-//! OpenEXR: 32-bit float channels, lossless.
+//! OpenEXR: 32-bit float and unsigned integer channels, lossless.
 //!
 //! Written are scan lines with ZIP compression and no attribute that changes from run to run, so
 //! the bytes depend on the pixels only.
 
+use std::collections::BTreeSet;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +11,7 @@ use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, Text, WritableImage as _, read};
 
+use super::Samples;
 use super::output::OutputError;
 
 /// One channel of an image: a name and a value for each pixel, rows from the top.
@@ -21,43 +23,63 @@ pub struct Channel<'a> {
     pub values: &'a [f32],
 }
 
+/// One channel of float or of unsigned integer values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plane {
+    /// For instance `Y` or `layer0.Y`.
+    pub name: String,
+    /// `width * height` values; integers are stored as such.
+    pub samples: Samples,
+}
+
 /// A file of the given channels, whatever their order.
 ///
 /// # Errors
 /// [`OutputError::Encode`] if a channel has not one value a pixel, or if names are missing, doubled
 /// or not ASCII.
 pub fn encode(width: u32, height: u32, channels: &[Channel<'_>]) -> Result<Vec<u8>, OutputError> {
+    let planes = channels.iter().map(|channel| Plane {
+        name: channel.name.into(),
+        samples: Samples::Float(channel.values.to_vec()),
+    });
+    encode_planes(width, height, planes.collect())
+}
+
+/// As [`encode`], of channels that may hold integers.
+///
+/// # Errors
+/// As [`encode`].
+pub fn encode_planes(width: u32, height: u32, planes: Vec<Plane>) -> Result<Vec<u8>, OutputError> {
     let fault = |reason| OutputError::Encode {
         format: "OpenEXR",
         width,
         height,
         reason,
     };
-    if channels.is_empty() || width == 0 || height == 0 {
+    if planes.is_empty() || width == 0 || height == 0 {
         return Err(fault("no channel or no pixel".into()));
     }
+    let mut seen = BTreeSet::new();
     let mut list = Vec::new();
-    for (index, channel) in channels.iter().enumerate() {
+    for Plane { name, samples } in planes {
         let pixels = u64::from(width) * u64::from(height);
-        if channel.values.len() as u64 != pixels {
-            let count = channel.values.len();
-            let reason = format!("channel `{}` has {count} values", channel.name);
-            return Err(fault(reason));
+        let count = match &samples {
+            Samples::Float(values) => values.len(),
+            Samples::Uint(values) => values.len(),
+        };
+        if count as u64 != pixels {
+            return Err(fault(format!("channel `{name}` has {count} values")));
         }
-        let name = Text::new_or_none(channel.name).filter(|_| !channel.name.is_empty());
-        let (Some(name), false) = (
-            name,
-            channels[..index]
-                .iter()
-                .any(|other| other.name == channel.name),
-        ) else {
-            let reason = format!("channel name `{}` is not plain or is doubled", channel.name);
+        let text = Text::new_or_none(&name).filter(|_| !name.is_empty());
+        let (Some(text), true) = (text, seen.insert(name.clone())) else {
+            let reason = format!("channel name `{name}` is not plain or is doubled");
             return Err(fault(reason));
         };
-        list.push(AnyChannel::new(
-            name,
-            FlatSamples::F32(channel.values.to_vec()),
-        ));
+        let samples = match samples {
+            Samples::Float(values) => FlatSamples::F32(values),
+            Samples::Uint(values) => FlatSamples::U32(values),
+        };
+        list.push(AnyChannel::new(text, samples));
     }
     let layer = Layer::new(
         (width as usize, height as usize),

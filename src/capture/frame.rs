@@ -1,16 +1,13 @@
-//! Whole frames on a device of our own, brought back to memory.
+//! What frames are asked for and what comes back.
 
-use crate::gpu::{Buffer, Gpu, GpuError, MemoryLocation, ValidationMessage};
-use crate::graph::{
-    Access, BufferDesc, BufferState, FakeMemory, FrameCache, FrameReport, Graph, GraphError,
-    HostBuffer, ImageDesc, ImageId, ImagePart, PassKind, Plan,
-};
+use super::dump::CapturedImage;
+use crate::gpu::GpuError;
+use crate::graph::{FakeMemory, FrameReport, Graph, GraphError, Plan};
 use crate::renderer::{Frame, NamedLight, SceneBuffers, UploadError, add_frame};
 use crate::scene::{Scene, SceneCamera};
 use crate::shadow::{Technique, TechniqueError};
 use ash::vk;
 use std::collections::BTreeMap;
-use std::time::Instant;
 
 /// What to render.
 #[derive(Clone, Debug)]
@@ -45,6 +42,8 @@ pub struct CapturedFrame {
     pub frame_ms: f64,
     /// Counts of things, by name.
     pub counters: BTreeMap<String, u64>,
+    /// The images asked for by name, in that order.
+    pub images: Vec<CapturedImage>,
 }
 
 /// One light of a [`CapturedFrame`].
@@ -88,6 +87,32 @@ pub enum CaptureError {
         /// Why.
         source: TechniqueError,
     },
+    /// No image of the frame has that name.
+    #[error("no image `{name}` in the frame; there is {}", have.join(", "))]
+    NoSuchImage {
+        /// The name asked for.
+        name: String,
+        /// All names.
+        have: Vec<String>,
+    },
+    /// The image has fewer layers or mip levels.
+    #[error("no image `{name}`: the image has {layers} layer(s) and {mips} mip level(s), from 0")]
+    NoSuchPart {
+        /// The name asked for.
+        name: String,
+        /// Its array layers.
+        layers: u32,
+        /// Its mip levels.
+        mips: u32,
+    },
+    /// The image's texels are of a kind that is not read.
+    #[error("image `{name}` cannot be dumped: its format {format:?} is not read")]
+    DumpFormat {
+        /// The name asked for.
+        name: String,
+        /// Its format.
+        format: vk::Format,
+    },
     /// The scene cannot be uploaded.
     #[error("scene: {0}")]
     Upload(#[from] UploadError),
@@ -97,148 +122,6 @@ pub enum CaptureError {
     /// The device refused.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-}
-
-/// Renders frames of one scene.
-pub struct FrameRenderer<'s> {
-    gpu: Gpu,
-    scene: &'s Scene,
-    buffers: SceneBuffers,
-    cache: FrameCache,
-}
-
-/// An image on its way to host memory.
-struct ReadBack {
-    image: ImageId,
-    desc: ImageDesc,
-    texel_bytes: u64,
-}
-
-impl<'s> FrameRenderer<'s> {
-    /// Uploads a scene to a device of our own. The device is destroyed if that fails.
-    pub fn new(mut gpu: Gpu, scene: &'s Scene) -> Result<Self, CaptureError> {
-        match gpu.run(|gpu, cmd| SceneBuffers::upload(gpu, cmd, scene)) {
-            Ok(buffers) => Ok(Self {
-                gpu,
-                scene,
-                buffers,
-                cache: FrameCache::new(),
-            }),
-            Err(error) => {
-                if let Err(second) = gpu.destroy() {
-                    log::warn!("after a failed upload: {second}");
-                }
-                Err(error.into())
-            }
-        }
-    }
-
-    /// Renders one frame and waits for it.
-    pub fn render(&mut self, request: &FrameRequest) -> Result<CapturedFrame, CaptureError> {
-        let most = self.gpu.info().limits.max_image_dimension2_d;
-        let lights = check(self.scene, request, most)?;
-        let [width, height] = request.size;
-        let pixels = u64::from(width) * u64::from(height);
-        let images = 1 + request.lights.len() as u64;
-        let bytes = pixels * (16 + 4 * (images - 1));
-        let usage = vk::BufferUsageFlags::TRANSFER_DST;
-        let location = MemoryLocation::GpuToCpu;
-        let target = self
-            .gpu
-            .create_buffer("read back", bytes, usage, location)?;
-        let result = self.render_into(request, &lights, &target);
-        let frame = result.map(|frame| fill(frame, &target, request));
-        self.gpu.destroy_buffer(target);
-        frame
-    }
-
-    fn render_into(
-        &mut self,
-        request: &FrameRequest,
-        lights: &[NamedLight],
-        target: &Buffer,
-    ) -> Result<CapturedFrame, CaptureError> {
-        let start = Instant::now();
-        let pipelines = self.gpu.pipelines_created();
-        let mut graph = Graph::continuing(self.cache.history());
-        let frame = declare(&mut graph, &self.buffers, request, lights);
-        let host = HostBuffer {
-            buffer: target.raw,
-            desc: BufferDesc { size: target.size },
-            usage: target.usage,
-            enter: BufferState::IDLE,
-            leave: BufferState::HOST_READ,
-        };
-        let mut offset = 0;
-        let mut buffer = graph.import_buffer("read back", host);
-        for read in read_backs(&frame, request) {
-            let size = u64::from(read.desc.width) * u64::from(read.desc.height) * read.texel_bytes;
-            let part = crate::graph::BufferPart { offset, size };
-            let mut pass = graph.pass("read back", PassKind::Transfer);
-            pass.read(read.image, Access::CopyRead);
-            buffer = pass.overwrite_part(buffer, part, Access::CopyWrite);
-            let (image, whole) = (read.image, ImagePart::whole(&read.desc));
-            pass.record(move |ctx| ctx.copy_image_to_buffer(image, whole, buffer, offset));
-            offset += size;
-        }
-        let compiled = graph.compile(&self.gpu)?;
-        let plan = compiled.plan().clone();
-        let cache = &mut self.cache;
-        let report = self.gpu.run(|gpu, cmd| compiled.record(gpu, cache, cmd))?;
-        let mut passes = self.gpu.collect_timings();
-        let copies: f64 = passes
-            .iter()
-            .filter(|(n, _)| n == "read back")
-            .map(|(_, ms)| ms)
-            .sum();
-        passes.retain(|(name, _)| name != "read back");
-        let frame_ms = (start.elapsed().as_secs_f64() * 1.0e3 - copies).max(0.0);
-        let counters = self.counters(&plan, &report, self.gpu.pipelines_created() - pipelines);
-        Ok(CapturedFrame {
-            size: request.size,
-            color: Vec::new(),
-            lights: captured_lights(request, &frame, &plan),
-            plan,
-            report,
-            passes,
-            frame_ms,
-            counters,
-        })
-    }
-
-    fn counters(
-        &self,
-        plan: &Plan,
-        report: &FrameReport,
-        pipelines: usize,
-    ) -> BTreeMap<String, u64> {
-        let counts = [
-            ("barriers", report.barriers as u64),
-            ("passes", report.passes.len() as u64),
-            ("passes_culled", plan.culled.len() as u64),
-            ("pipelines_created", pipelines as u64),
-            ("transient_bytes", plan.peak_bytes()),
-            ("transient_bytes_unaliased", plan.unaliased_bytes()),
-            ("triangles", self.buffers.triangle_count() as u64),
-            (
-                "triangles_without_area",
-                self.buffers.degenerate_count() as u64,
-            ),
-        ];
-        counts.map(|(name, count)| (name.to_string(), count)).into()
-    }
-
-    /// The device.
-    pub fn gpu(&self) -> &Gpu {
-        &self.gpu
-    }
-
-    /// Gives everything back; returns what the validation layer said, leaks included.
-    pub fn destroy(mut self) -> Result<Vec<ValidationMessage>, GpuError> {
-        self.cache.destroy(&mut self.gpu);
-        self.buffers.destroy(&mut self.gpu);
-        self.gpu.destroy()
-    }
 }
 
 /// Plans a frame without a device.
@@ -272,7 +155,8 @@ pub fn exposure(color: &[[f32; 4]]) -> f32 {
     0.8 / *luminance
 }
 
-fn check(
+/// The lights of a request that can be rendered.
+pub(super) fn check(
     scene: &Scene,
     request: &FrameRequest,
     most: u32,
@@ -306,7 +190,8 @@ fn check(
     lights.collect()
 }
 
-fn declare<'f>(
+/// Declares the frame.
+pub(super) fn declare<'f>(
     graph: &mut Graph<'f>,
     buffers: &'f SceneBuffers,
     request: &FrameRequest,
@@ -321,51 +206,4 @@ fn declare<'f>(
         lights,
         request.technique,
     )
-}
-
-fn read_backs(frame: &Frame, request: &FrameRequest) -> Vec<ReadBack> {
-    let [width, height] = request.size;
-    let mut all = vec![ReadBack {
-        image: frame.radiance,
-        desc: ImageDesc::new(vk::Format::R32G32B32A32_SFLOAT, width, height),
-        texel_bytes: 16,
-    }];
-    all.extend(frame.visibility.iter().map(|image| ReadBack {
-        image: *image,
-        desc: ImageDesc::new(vk::Format::R32_SFLOAT, width, height),
-        texel_bytes: 4,
-    }));
-    all
-}
-
-/// The lights, with the passes that make their visibility.
-fn captured_lights(request: &FrameRequest, frame: &Frame, plan: &Plan) -> Vec<CapturedLight> {
-    let pairs = request.lights.iter().zip(&frame.visibility_passes);
-    pairs
-        .map(|(light, range)| {
-            let own = plan
-                .passes
-                .iter()
-                .filter(|pass| range.contains(&pass.declared));
-            CapturedLight {
-                light: *light,
-                visibility: Vec::new(),
-                passes: own.map(|pass| pass.name.to_string()).collect(),
-            }
-        })
-        .collect()
-}
-
-/// Takes the pixels out of the buffer they were read back into.
-fn fill(mut frame: CapturedFrame, target: &Buffer, request: &FrameRequest) -> CapturedFrame {
-    let pixels = request.size[0] as usize * request.size[1] as usize;
-    let bytes = target.mapped().unwrap_or_default();
-    let (color, mut rest) = bytes.split_at((16 * pixels).min(bytes.len()));
-    frame.color = bytemuck::pod_collect_to_vec(color);
-    for light in &mut frame.lights {
-        let (visibility, others) = rest.split_at((4 * pixels).min(rest.len()));
-        light.visibility = bytemuck::pod_collect_to_vec(visibility);
-        rest = others;
-    }
-    frame
 }

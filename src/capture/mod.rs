@@ -1,7 +1,11 @@
 //! Frames to files.
 
+mod dump;
 mod frame;
+mod render;
 
+#[cfg(feature = "cli")]
+pub mod dump_file;
 #[cfg(feature = "cli")]
 pub mod exr;
 #[cfg(feature = "cli")]
@@ -9,6 +13,6 @@ pub mod output;
 #[cfg(feature = "cli")]
 pub mod png;
 
-pub use frame::{
-    CaptureError, CapturedFrame, CapturedLight, FrameRenderer, FrameRequest, exposure, plan_frame,
-};
+pub use dump::{CapturedImage, FRIENDLY_NAMES, ImageContent, Samples};
+pub use frame::{CaptureError, CapturedFrame, CapturedLight, FrameRequest, exposure, plan_frame};
+pub use render::FrameRenderer;

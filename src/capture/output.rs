@@ -4,6 +4,9 @@ use std::fmt;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::NamedTempFile;
 
 /// Where output goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -128,15 +131,9 @@ impl Output {
                 .map_err(create)?;
             return device.write_all(bytes).map_err(failed);
         }
-        let mut aside = create_aside(folder_of(&target)).map_err(create)?;
-        (aside.write_all(bytes))
-            .and_then(|()| aside.flush())
-            .map_err(failed)?;
-        match aside.persist(&target) {
-            Ok(_) => Ok(()),
-            // The file aside goes away with the error.
-            Err(error) => Err(create(error.error)),
-        }
+        let mut aside = Aside::create(folder_of(&target)).map_err(create)?;
+        aside.fill(bytes).map_err(failed)?;
+        aside.persist(&target).map_err(create)
     }
 
     /// Checks what can be checked before the work is done: that the folder exists, takes files, and
@@ -159,7 +156,8 @@ impl Output {
                 Err(error) => Err(create(error)),
             };
         }
-        create_aside(folder_of(&target)).map(drop).map_err(create)
+        let aside = Aside::create(folder_of(&target));
+        aside.map(drop).map_err(create)
     }
 
     /// The file behind links.
@@ -187,15 +185,70 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-fn create_aside(folder: &Path) -> io::Result<tempfile::NamedTempFile<File>> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".antumbra-").suffix(".part");
-    #[cfg(unix)]
-    let permissions = {
-        use std::os::unix::fs::PermissionsExt as _;
-        std::fs::Permissions::from_mode(0o666)
-    };
-    #[cfg(unix)]
-    builder.permissions(permissions);
-    builder.tempfile_in(folder)
+/// Files aside that are there now: whoever ends the process early removes them first.
+static ASIDE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn asides() -> MutexGuard<'static, Vec<PathBuf>> {
+    ASIDE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the files aside of outputs that are being written, and lets nobody begin another one
+/// while the returned value lives: for ending the process at any moment without a trace.
+pub(crate) fn abandon_all() -> impl Drop {
+    let asides = asides();
+    for path in asides.iter() {
+        // Nobody is left who could do something about it.
+        let _ = std::fs::remove_file(path);
+    }
+    asides
+}
+
+/// A file next to the one asked for, gone when dropped.
+struct Aside {
+    /// `None` once it has been renamed.
+    file: Option<NamedTempFile<File>>,
+    path: PathBuf,
+}
+
+impl Aside {
+    fn create(folder: &Path) -> io::Result<Self> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".antumbra-").suffix(".part");
+        #[cfg(unix)]
+        let permissions = {
+            use std::os::unix::fs::PermissionsExt as _;
+            std::fs::Permissions::from_mode(0o666)
+        };
+        #[cfg(unix)]
+        builder.permissions(permissions);
+        let mut asides = asides();
+        let file = builder.tempfile_in(folder)?;
+        let path = file.path().to_path_buf();
+        asides.push(path.clone());
+        let file = Some(file);
+        Ok(Self { file, path })
+    }
+
+    fn fill(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match &mut self.file {
+            Some(file) => file.write_all(bytes).and_then(|()| file.flush()),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes the place of `target`; after an error it is gone.
+    fn persist(mut self, target: &Path) -> io::Result<()> {
+        match self.file.take() {
+            Some(file) => file.persist(target).map(drop).map_err(|error| error.error),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Drop for Aside {
+    fn drop(&mut self) {
+        let mut asides = asides();
+        self.file = None;
+        asides.retain(|path| *path != self.path);
+    }
 }

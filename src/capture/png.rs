@@ -1,4 +1,4 @@
-//! PNG: 8-bit sRGB pictures and 16-bit linear grey masks.
+//! PNG: 8-bit sRGB pictures, 16-bit linear masks and images of numbers.
 //!
 //! The bytes depend on the pixels only.
 
@@ -49,15 +49,28 @@ pub fn encode_linear_rgb(
 /// # Errors
 /// [`OutputError::Encode`] if there is not one value a pixel.
 pub fn encode_grey16(width: u32, height: u32, values: &[f32]) -> Result<Vec<u8>, OutputError> {
-    let bytes: Vec<u8> = (values.iter())
-        .flat_map(|&value| {
-            // The cast clips, and turns NaN into 0.
-            let quantised = (65535.0 * f64::from(value) + 0.5) as u16;
-            // The encoder takes native order and writes big-endian.
-            quantised.to_ne_bytes()
-        })
-        .collect();
+    let bytes = linear16(values);
     encode(width, height, &bytes, ExtendedColorType::L16, 2)
+}
+
+/// Three values from 0 to 1 for each pixel, linear in 16 bits, rows from the top; values outside
+/// are clipped, NaN is 0.
+///
+/// # Errors
+/// [`OutputError::Encode`] if there are not three values a pixel.
+pub fn encode_linear_rgb16(width: u32, height: u32, rgb: &[f32]) -> Result<Vec<u8>, OutputError> {
+    let bytes = linear16(rgb);
+    encode(width, height, &bytes, ExtendedColorType::Rgb16, 6)
+}
+
+fn linear16(values: &[f32]) -> Vec<u8> {
+    let bytes = values.iter().flat_map(|&value| {
+        // The cast clips, and turns NaN into 0.
+        let quantised = (65535.0 * f64::from(value) + 0.5) as u16;
+        // The encoder takes native order and writes big-endian.
+        quantised.to_ne_bytes()
+    });
+    bytes.collect()
 }
 
 fn encode(

@@ -9,7 +9,7 @@ use clap::Args;
 use super::error::CliError;
 use crate::capture::FrameRequest;
 use crate::light::{LightOverrides, LightScale, LightSize, ShapeKind, SunAngle};
-use crate::scene::{LoadOptions, Scene, SceneCamera, SceneLight};
+use crate::scene::{LoadOptions, Scene, SceneCamera, SceneFile, SceneLight};
 use crate::shadow::Technique;
 
 /// Largest width and height of a picture.
@@ -45,6 +45,14 @@ fn parse_technique(text: &str) -> Result<Technique, String> {
     text.parse::<Technique>().map_err(|error| error.to_string())
 }
 
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text
+        .parse()
+        .ok()
+        .filter(|seconds: &f64| seconds.is_finite());
+    seconds.ok_or_else(|| "give seconds, such as 1.5".into())
+}
+
 /// What to render.
 #[derive(Debug, Args)]
 pub(super) struct ViewArgs {
@@ -67,6 +75,13 @@ pub(super) struct ViewArgs {
     /// Render with this light alone; all lights by default
     #[arg(long, value_name = "NAME|INDEX")]
     light: Option<String>,
+
+    /// Moment of the scene's animation, in seconds after its start
+    #[arg(
+        long, value_name = "S", default_value = "0", value_parser = parse_seconds,
+        allow_hyphen_values = true
+    )]
+    time: f64,
 
     #[command(flatten)]
     overrides: OverrideArgs,
@@ -98,8 +113,22 @@ struct OverrideArgs {
 pub(super) struct View {
     pub(super) scene: Scene,
     pub(super) request: FrameRequest,
-    /// Reading the file, in milliseconds.
+    /// Reading the scene, in milliseconds.
     pub(super) load_ms: f64,
+}
+
+/// A scene file that has been read, to be seen at any moment.
+pub(super) struct OpenScene {
+    file: SceneFile,
+    /// Reading the file, in milliseconds.
+    pub(super) open_ms: f64,
+}
+
+impl OpenScene {
+    /// False if it is the same at all times.
+    pub(super) fn is_animated(&self) -> bool {
+        self.file.is_animated()
+    }
 }
 
 impl ViewArgs {
@@ -107,11 +136,33 @@ impl ViewArgs {
         &self.scene
     }
 
-    /// Reads the scene and settles everything that the command line leaves to it.
-    pub(super) fn load(&self) -> Result<View, CliError> {
+    /// `--time`, in seconds.
+    pub(super) fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Reads the scene file.
+    pub(super) fn open(&self) -> Result<OpenScene, CliError> {
         let start = Instant::now();
-        let mut scene =
-            Scene::load(&self.scene, &LoadOptions::default()).map_err(CliError::Scene)?;
+        let options = LoadOptions::default();
+        let file = SceneFile::open(&self.scene, &options).map_err(CliError::Scene)?;
+        let open_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(OpenScene { file, open_ms })
+    }
+
+    /// Reads the scene as it is at `--time` and settles everything that the command line leaves to
+    /// it.
+    pub(super) fn load(&self) -> Result<View, CliError> {
+        let opened = self.open()?;
+        let mut view = self.at(&opened, self.time)?;
+        view.load_ms += opened.open_ms;
+        Ok(view)
+    }
+
+    /// As [`load`](Self::load), at any moment.
+    pub(super) fn at(&self, opened: &OpenScene, seconds: f64) -> Result<View, CliError> {
+        let start = Instant::now();
+        let mut scene = opened.file.scene_at(seconds).map_err(CliError::Scene)?;
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
 
         let camera = self.select_camera(&scene)?;

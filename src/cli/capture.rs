@@ -1,7 +1,5 @@
-//! `antumbra capture`: a scene to a picture, to visibility images and to a report.
+//! `antumbra capture`: a scene to pictures, to visibility and other images, and to a report.
 
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -9,14 +7,18 @@ use std::time::Instant;
 use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{Args, value_parser};
 
-use super::args::{View, ViewArgs};
+use super::args::{OpenScene, View, ViewArgs};
 use super::error::CliError;
-use super::outputs::{self, Format, ImageFile};
-use super::report::{ImageEntry, Measurements, PeakBytes, Report, SetupTimes};
-use super::summary::{Stats, single_value};
+use super::frames::{Fps, FrameRange, Timeline};
+use super::outputs;
+use super::progress::Progress;
+use super::report::{ImageEntry, Report};
+use super::shot::{self, Content, DumpArg, Shot, Wanted};
+use super::summary::summarize;
+use super::template::ImageTemplate;
 use super::{pipeline_cache, print_text};
-use crate::capture::output::{Output, OutputError};
-use crate::capture::{CapturedFrame, FrameRenderer, exposure, exr, png};
+use crate::capture::output::Output;
+use crate::capture::{FrameRenderer, FrameRequest};
 use crate::gpu::{DeviceInfo, Gpu, GpuOptions};
 
 const WARM_UP_FRAMES: u32 = 2;
@@ -28,28 +30,53 @@ Examples:
   antumbra capture scene.glb -o picture.exr --size 1280x720 --camera front
   antumbra capture scene.glb --visibility vis_{light}.exr --report report.json
   antumbra capture scene.glb --light lamp --light-shape disk --light-size 0.5 --visibility vis.exr
+  antumbra capture scene.glb -o walk_{frame:04}.png --frames 0..48 --fps 24
+  antumbra capture scene.glb --dump depth=depth.exr --dump normal=normal.png
+  antumbra capture scene.glb --dump 'hard.map_depth 0:lamp[0]=map.exr'
   antumbra capture scene.glb -o - | display
 
-A picture that is one single colour is a failure unless --allow-uniform is given.";
+In names {frame} is the frame's number, {frame:04} the same with at least 4 digits, {light} the
+index of a light. A picture that is one single colour is a failure unless --allow-uniform is given.";
 
-/// Render a scene to a picture, to float visibility images and to a report of timings
+/// Render a scene to pictures, to float visibility images and to a report of timings
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct CaptureArgs {
     /// Shaded picture: .png (exposed, sRGB), .exr (linear R, G, B), or - for a PNG to standard output
     #[arg(
         short, long, value_name = "FILE",
-        value_parser = PathBufValueParser::new().try_map(ImageFile::picture)
+        value_parser = PathBufValueParser::new().try_map(ImageTemplate::picture)
     )]
-    output: Option<ImageFile>,
+    output: Option<ImageTemplate>,
 
     /// Visibility of a light: .exr (channel Y, 32-bit float) or .png (16-bit grey). Of the first
     /// light (or --light); with {light} in the name of each, under its index
     #[arg(
         long, value_name = "FILE",
-        value_parser = PathBufValueParser::new().try_map(ImageFile::by_ending)
+        value_parser = PathBufValueParser::new().try_map(ImageTemplate::by_ending)
     )]
-    visibility: Option<ImageFile>,
+    visibility: Option<ImageTemplate>,
+
+    /// Image of the frame by name: depth (metres along the view, 0 where nothing is), normal,
+    /// shading_normal, visibility, or any that `antumbra graph` lists; NAME[2] is its layer 2,
+    /// NAME[2,1] mip level 1 of that. .exr has the numbers, .png a picture of them. Repeatable
+    #[arg(long, value_name = "NAME=FILE")]
+    dump: Vec<DumpArg>,
+
+    /// Frames A to B - 1, one after the other; frame n is at --time plus n / --fps. Names of images
+    /// need {frame} then
+    #[arg(long, value_name = "A..B", allow_hyphen_values = true)]
+    frames: Option<FrameRange>,
+
+    /// Frames per second
+    #[arg(
+        long,
+        value_name = "F",
+        default_value = "30",
+        requires = "frames",
+        allow_hyphen_values = true
+    )]
+    fps: Fps,
 
     /// Timings, memory and counters as JSON; renders 2 warm-up frames first, then measures 7
     #[arg(long, value_name = "FILE")]
@@ -76,205 +103,271 @@ pub(super) struct CaptureArgs {
     view: ViewArgs,
 }
 
-/// What rendering left behind.
-struct Rendered {
-    frame: CapturedFrame,
-    measured: Measurements,
-    setup: SetupTimes,
-    peak: PeakBytes,
-    driver: String,
-}
-
 pub(super) fn run(args: &CaptureArgs) -> Result<(), CliError> {
-    let view = args.view.load()?;
-    let visibility = visibility_files(args, &view);
-    check_outputs(args, &visibility)?;
-
-    let rendered = render(args, &view)?;
-
-    if let (Some(_), false, Some(value)) = (
-        &args.output,
-        args.allow_uniform,
-        single_value(&rendered.frame.color),
-    ) {
-        return Err(CliError::Uniform { value });
-    }
-    let files = encode(args, &visibility, &view, &rendered)?;
-    outputs::write(&files)?;
-
-    let text = summarize(args, &view, &rendered, &files);
-    if files.iter().any(|(output, _)| *output == Output::Stdout) {
-        // Everything asked for is written; a closed standard error takes nothing from that.
-        let _ = std::io::stderr().write_all(text.as_bytes());
-        Ok(())
-    } else {
-        print_text(&text)
-    }
-}
-
-/// Each visibility file with the index of its light.
-fn visibility_files(args: &CaptureArgs, view: &View) -> Vec<(usize, ImageFile)> {
-    let lights = &view.request.lights;
-    match &args.visibility {
-        Some(file) if file.is_per_light() => lights
-            .iter()
-            .map(|&light| (light, file.for_light(light)))
-            .collect(),
-        Some(file) => (lights.first())
-            .map(|&light| (light, file.clone()))
-            .into_iter()
-            .collect(),
-        None => Vec::new(),
-    }
-}
-
-fn check_outputs(args: &CaptureArgs, visibility: &[(usize, ImageFile)]) -> Result<(), CliError> {
-    let picture = args.output.iter().map(|file| file.path.clone());
-    let visibility = visibility.iter().map(|(_, file)| file.path.clone());
-    let all: Vec<Output> = picture
-        .chain(visibility)
-        .chain(args.report.clone())
-        .map(Output::from)
-        .collect();
-    outputs::check(&all, args.view.scene_path())
-}
-
-fn render(args: &CaptureArgs, view: &View) -> Result<Rendered, CliError> {
-    let mut gpu = Gpu::create(&GpuOptions {
-        device: args.device.clone(),
-        validation: args.validation,
-        pipeline_cache: None,
-        application_name: "antumbra".into(),
-    })?;
-    // One file a driver, and which driver it is shows only now.
-    if let Some(file) = pipeline_cache::file(gpu.info()) {
-        gpu.use_pipeline_cache(file);
-    }
-    let driver = driver_text(gpu.info());
-
-    let start = Instant::now();
-    let mut renderer = FrameRenderer::new(gpu, &view.scene)?;
-    let load_ms = view.load_ms + start.elapsed().as_secs_f64() * 1e3;
-    let frames = render_frames(args, view, &mut renderer);
-    let memory = renderer.gpu().memory_use();
-    let messages = renderer.destroy();
-    // An error of the frames comes before what it may have led to.
-    let (frame, measured, first_frame_ms) = frames?;
-    let messages = messages?;
-    if let Some(first) = messages.first() {
-        return Err(CliError::Validation {
-            count: messages.len(),
-            first: first.clone(),
-        });
-    }
-    Ok(Rendered {
-        frame,
-        measured,
-        setup: SetupTimes {
-            load: load_ms,
-            pipelines: None,
-            first_frame: first_frame_ms,
-        },
-        peak: PeakBytes {
-            device: memory.peak_device_bytes,
-            host: memory.peak_host_bytes,
-        },
-        driver,
-    })
-}
-
-/// Renders what was asked for: the last frame, the timings, and the time of the very first frame.
-fn render_frames(
-    args: &CaptureArgs,
-    view: &View,
-    renderer: &mut FrameRenderer<'_>,
-) -> Result<(CapturedFrame, Measurements, f64), CliError> {
-    let is_measured = args.report.is_some() || args.repeat.is_some();
-    let (warm_up, count) = if is_measured {
-        (WARM_UP_FRAMES, args.repeat.unwrap_or(MEASURED_FRAMES))
-    } else {
-        (0, 1)
+    let timeline = Timeline::new(args.view.time(), args.frames, args.fps);
+    let first = timeline.numbers().start;
+    let named = |error: CliError| match timeline.is_sequence() {
+        true => error.in_frame(first),
+        false => error,
     };
-    let mut frame = renderer.render(&view.request)?;
-    let first_frame_ms = frame.frame_ms;
-    let mut measured = Measurements::default();
-    if warm_up == 0 {
-        measured.add(&frame);
+    let progress = Progress::new(timeline.numbers().len() as u64);
+    progress.say("loading");
+    let opened = args.view.open()?;
+    let mut view = args.view.at(&opened, timeline.time(first)).map_err(named)?;
+    view.load_ms += opened.open_ms;
+    let job = Job {
+        args,
+        timeline,
+        opened,
+        lights: view.request.lights.clone(),
+    };
+    job.check_outputs()?;
+    job.run(view, progress)
+}
+
+/// A capture whose arguments have been checked.
+struct Job<'a> {
+    args: &'a CaptureArgs,
+    timeline: Timeline,
+    opened: OpenScene,
+    /// Those of every frame, as indices into its scene's lights.
+    lights: Vec<usize>,
+}
+
+impl Job<'_> {
+    /// The image files of a frame.
+    fn wanted(&self, frame: u32) -> Result<Vec<Wanted>, CliError> {
+        let args = self.args;
+        let mut wanted = Vec::new();
+        let first = self.lights.first().copied().unwrap_or_default();
+        let mut one = |content, template: &ImageTemplate| {
+            if template.is_per_light() && self.lights.len() > 1 {
+                let text = format!(
+                    "{{light}} in `{}`: this image has {} lights; choose one with --light",
+                    template.text(),
+                    self.lights.len()
+                );
+                return Err(CliError::Usage(text));
+            }
+            let file = template.at(frame, first);
+            wanted.push(Wanted { content, file });
+            Ok(())
+        };
+        if let Some(template) = &args.output {
+            one(Content::Picture, template)?;
+        }
+        for (at, DumpArg { name, file }) in args.dump.iter().enumerate() {
+            if name != "visibility" || !file.is_per_light() {
+                one(Content::Dump(at), file)?;
+            }
+        }
+        let all = || self.lights.iter().copied();
+        if let Some(template) = &args.visibility {
+            let lights = all().take(if template.is_per_light() {
+                usize::MAX
+            } else {
+                1
+            });
+            wanted.extend(lights.map(|light| Wanted {
+                content: Content::Visibility(light),
+                file: template.at(frame, light),
+            }));
+        }
+        for DumpArg { name, file } in &args.dump {
+            if name == "visibility" && file.is_per_light() {
+                wanted.extend(all().map(|light| Wanted {
+                    content: Content::DumpedVisibility(light),
+                    file: file.at(frame, light),
+                }));
+            }
+        }
+        Ok(wanted)
     }
-    for number in 1..warm_up + count {
-        frame = renderer.render(&view.request)?;
-        if number >= warm_up {
-            measured.add(&frame);
+
+    /// Checks the outputs of all frames before the work for the first begins.
+    fn check_outputs(&self) -> Result<(), CliError> {
+        let (args, frames) = (self.args, self.timeline.numbers());
+        let templates = [&args.output, &args.visibility].into_iter().flatten();
+        let mut templates = templates.chain(args.dump.iter().map(|dump| &dump.file));
+        if frames.len() > 1
+            && let Some(template) = templates.find(|template| !template.is_per_frame())
+        {
+            return Err(CliError::Usage(format!(
+                "{} frames, but the name `{}` is the same for each; put {{frame:04}} into it",
+                frames.len(),
+                template.text()
+            )));
+        }
+        let mut all: Vec<Output> = Vec::new();
+        for frame in frames {
+            let wanted = self.wanted(frame)?.into_iter();
+            all.extend(wanted.map(|wanted| wanted.file.path.into()));
+        }
+        all.extend(args.report.iter().map(|path| path.clone().into()));
+        outputs::check(&all, args.view.scene_path())
+    }
+
+    fn run(&self, view: View, progress: Progress) -> Result<(), CliError> {
+        let args = self.args;
+        progress.say("opening the device");
+        let mut gpu = Gpu::create(&GpuOptions {
+            device: args.device.clone(),
+            validation: args.validation,
+            pipeline_cache: None,
+            application_name: "antumbra".into(),
+        })?;
+        // One file a driver, and which driver it is shows only now.
+        if let Some(file) = pipeline_cache::file(gpu.info()) {
+            gpu.use_pipeline_cache(file);
+        }
+        let driver = driver_text(gpu.info());
+        let mut entries = Vec::new();
+        let start = Instant::now();
+        let mut renderer = FrameRenderer::owning(gpu, view.scene)?;
+        let load_ms = view.load_ms + start.elapsed().as_secs_f64() * 1e3;
+        let last = self.frames(
+            (view.request, load_ms),
+            &mut renderer,
+            &driver,
+            &mut entries,
+            &progress,
+        );
+        let messages = renderer.destroy();
+        // An error of the frames comes before what it may have led to.
+        let (shot, wanted) = last?;
+        let messages = messages?;
+        if let Some(first) = messages.first() {
+            return Err(CliError::Validation {
+                count: messages.len(),
+                first: first.clone(),
+            });
+        }
+        // The last frame's files come last of all: by now nothing else can fail.
+        let report = match &args.report {
+            Some(path) => Some((path.clone().into(), Report::new(entries).to_json()?)),
+            None => None,
+        };
+        let number = shot.number;
+        let delivered = self.deliver(&shot, &wanted, &driver, report, &progress);
+        delivered.map_err(|error| self.name_frame(number, error))
+    }
+
+    fn name_frame(&self, number: u32, error: CliError) -> CliError {
+        match self.timeline.is_sequence() {
+            true => error.in_frame(number),
+            false => error,
         }
     }
-    Ok((frame, measured, first_frame_ms))
-}
 
-fn encode(
-    args: &CaptureArgs,
-    visibility: &[(usize, ImageFile)],
-    view: &View,
-    rendered: &Rendered,
-) -> Result<Vec<(Output, Vec<u8>)>, CliError> {
-    let frame = &rendered.frame;
-    let [width, height] = frame.size;
-    let mut files = Vec::new();
-    if let Some(file) = &args.output {
-        let bytes = encode_picture(frame, file.format)?;
-        files.push((Output::from(file.path.clone()), bytes));
-    }
-    for (index, file) in visibility {
-        // The renderer makes the visibility of every light that it was asked for.
-        for light in frame.lights.iter().filter(|light| light.light == *index) {
-            let bytes = match file.format {
-                Format::Exr => exr::encode_y(width, height, &light.visibility)?,
-                Format::Png => png::encode_grey16(width, height, &light.visibility)?,
+    /// Renders all frames and delivers all but the last, which it returns.
+    fn frames(
+        &self,
+        first: (FrameRequest, f64),
+        renderer: &mut FrameRenderer<'_>,
+        driver: &str,
+        entries: &mut Vec<ImageEntry>,
+        progress: &Progress,
+    ) -> Result<(Shot, Vec<Wanted>), CliError> {
+        let numbers = self.timeline.numbers();
+        let (mut request, mut load_ms) = first;
+        for number in numbers.clone() {
+            if self.timeline.is_sequence() {
+                progress.say(format!("frame {number}"));
+            } else {
+                progress.say("rendering");
+            }
+            let mut shoot = || -> Result<_, CliError> {
+                let wanted = self.wanted(number)?;
+                if number != numbers.start {
+                    load_ms = self.next_scene(number, renderer, &mut request)?;
+                }
+                let shot = self.shoot(number, &request, load_ms, renderer)?;
+                Ok((shot, wanted))
             };
-            files.push((Output::from(file.path.clone()), bytes));
+            let name = |error| self.name_frame(number, error);
+            let (shot, wanted) = shoot().map_err(name)?;
+            if self.args.report.is_some() {
+                entries.extend(shot.entries(self.args.view.scene_path(), driver));
+            }
+            progress.step();
+            if number + 1 == numbers.end {
+                return Ok((shot, wanted));
+            }
+            self.deliver(&shot, &wanted, driver, None, progress)
+                .map_err(name)?;
         }
+        unreachable!("a timeline has at least one frame, and its last returns")
     }
-    if let Some(path) = &args.report {
-        let bytes = report(args, view, rendered).to_json()?;
-        files.push((Output::from(path.clone()), bytes));
-    }
-    Ok(files)
-}
 
-fn encode_picture(frame: &CapturedFrame, format: Format) -> Result<Vec<u8>, OutputError> {
-    let [width, height] = frame.size;
-    let scale = match format {
-        Format::Png => exposure(&frame.color),
-        Format::Exr => 1.0,
-    };
-    let rgb: Vec<[f32; 3]> = (frame.color.iter())
-        .map(|pixel| [pixel[0] * scale, pixel[1] * scale, pixel[2] * scale])
-        .collect();
-    match format {
-        Format::Png => png::encode_linear_rgb(width, height, &rgb),
-        Format::Exr => exr::encode_rgb(width, height, &rgb),
+    /// Gives the renderer the scene of a later frame; returns the milliseconds that this took.
+    fn next_scene(
+        &self,
+        number: u32,
+        renderer: &mut FrameRenderer<'_>,
+        request: &mut FrameRequest,
+    ) -> Result<f64, CliError> {
+        let start = Instant::now();
+        if self.opened.is_animated() {
+            let seconds = self.timeline.time(number);
+            let view = self.args.view.at(&self.opened, seconds)?;
+            renderer.set_scene(view.scene)?;
+            *request = view.request;
+        }
+        Ok(start.elapsed().as_secs_f64() * 1e3)
     }
-}
 
-fn report(args: &CaptureArgs, view: &View, rendered: &Rendered) -> Report {
-    let (frame, measured) = (&rendered.frame, &rendered.measured);
-    let entries = frame.lights.iter().map(|light| ImageEntry {
-        scene: args.view.scene_path().display().to_string(),
-        frame: 0,
-        light: view.scene.lights[light.light].name.clone(),
-        technique: view.request.technique.name(),
-        options: BTreeMap::new(),
-        driver: rendered.driver.clone(),
-        width: frame.size[0],
-        height: frame.size[1],
-        frame_ms: measured.frame(),
-        frame_ms_static: None,
-        visibility_ms: measured.sum_of(&light.passes),
-        passes: measured.passes(frame),
-        setup_ms: rendered.setup,
-        peak_bytes: rendered.peak,
-        counters: frame.counters.clone(),
-    });
-    Report::new(entries.collect())
+    fn shoot(
+        &self,
+        number: u32,
+        request: &FrameRequest,
+        load_ms: f64,
+        renderer: &mut FrameRenderer<'_>,
+    ) -> Result<Shot, CliError> {
+        let args = self.args;
+        let repeat = args.repeat.unwrap_or(MEASURED_FRAMES);
+        let is_measured = args.report.is_some() || args.repeat.is_some();
+        let plan = shot::Plan {
+            number,
+            seconds: self.timeline.time(number),
+            load_ms,
+            repeats: is_measured.then_some((WARM_UP_FRAMES, repeat)),
+            dumps: args.dump.iter().map(|dump| dump.name.as_str()).collect(),
+        };
+        let shot = Shot::take(plan, request, renderer)?;
+        if args.output.is_some() && !args.allow_uniform {
+            shot.refuse_single_value()?;
+        }
+        Ok(shot)
+    }
+
+    /// Writes the files of a frame and says so.
+    fn deliver(
+        &self,
+        shot: &Shot,
+        wanted: &[Wanted],
+        driver: &str,
+        report: Option<(Output, Vec<u8>)>,
+        progress: &Progress,
+    ) -> Result<(), CliError> {
+        let mut files = wanted
+            .iter()
+            .map(|wanted| shot.encode(wanted))
+            .collect::<Result<Vec<_>, CliError>>()?;
+        files.extend(report);
+        outputs::write(&files)?;
+        let is_first = shot.number == self.timeline.numbers().start;
+        let number = self.timeline.is_sequence().then_some(shot.number);
+        let text = summarize(shot, is_first.then_some(driver), number, &files);
+        progress.above(|| {
+            if files.iter().any(|(output, _)| *output == Output::Stdout) {
+                // Everything asked for is written; a closed standard error takes nothing from that.
+                let _ = std::io::stderr().write_all(text.as_bytes());
+                Ok(())
+            } else {
+                print_text(&text)
+            }
+        })
+    }
 }
 
 fn driver_text(info: &DeviceInfo) -> String {
@@ -285,69 +378,4 @@ fn driver_text(info: &DeviceInfo) -> String {
         .filter(|part| !part.is_empty())
         .collect();
     parts.join(", ")
-}
-
-fn summarize(
-    args: &CaptureArgs,
-    view: &View,
-    rendered: &Rendered,
-    files: &[(Output, Vec<u8>)],
-) -> String {
-    let frame = &rendered.frame;
-    let mut text = String::new();
-    let mut row = |name: &str, value: String| {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{name:<11}{value}");
-    };
-    row("driver", rendered.driver.clone());
-    row("size", format!("{}x{}", frame.size[0], frame.size[1]));
-    row("camera", camera_text(view));
-    row("technique", view.request.technique.name().into());
-    if let Some(spread) = rendered.measured.frame() {
-        let first = rendered.setup.first_frame;
-        row(
-            "frame",
-            if args.report.is_some() || args.repeat.is_some() {
-                format!(
-                    "{:.3} ms (min {:.3}, max {:.3}; the first {first:.3})",
-                    spread.median, spread.min, spread.max
-                )
-            } else {
-                format!("{first:.3} ms (the first of a run)")
-            },
-        );
-    }
-    let rgb = frame.color.iter().flat_map(|pixel| &pixel[..3]).copied();
-    row("picture", Stats::of(rgb).to_string());
-    for light in &frame.lights {
-        let scene_light = &view.scene.lights[light.light];
-        row(
-            "visibility",
-            format!(
-                "{}  light {} `{}` ({})",
-                Stats::of(light.visibility.iter().copied()),
-                light.light,
-                scene_light.name,
-                scene_light.light.shape
-            ),
-        );
-    }
-    for (output, bytes) in files {
-        row("wrote", format!("{output} ({} bytes)", bytes.len()));
-    }
-    text
-}
-
-fn camera_text(view: &View) -> String {
-    let camera = &view.request.camera;
-    if camera.node.is_some() {
-        return format!("{} `{}`", camera.index, camera.name);
-    }
-    let eye = camera.position.as_dvec3() + view.scene.rebase_origin;
-    let forward = camera.forward;
-    format!(
-        "none in the scene; the whole of it from ({:.4}, {:.4}, {:.4}) along ({:.4}, {:.4}, {:.4}), \
-         yfov {:.4} radians",
-        eye.x, eye.y, eye.z, forward.x, forward.y, forward.z, camera.yfov
-    )
 }

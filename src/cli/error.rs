@@ -2,6 +2,8 @@
 
 use std::error::Error;
 
+use ash::vk;
+
 use crate::capture::CaptureError;
 use crate::capture::output::OutputError;
 use crate::gpu::{GpuError, ValidationMessage};
@@ -27,8 +29,17 @@ pub(super) enum CliError {
     Gpu(#[from] GpuError),
     #[error(transparent)]
     Capture(Box<CaptureError>),
+    /// The device has not enough memory for pictures of that size.
+    #[error("{0}; a smaller --size needs less")]
+    Memory(Box<CaptureError>),
+    /// One frame of several; those before it are done.
+    #[error("frame {number}: {source}")]
+    Frame { number: u32, source: Box<CliError> },
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// What another area has to say.
+    #[error(transparent)]
+    Other(Box<dyn Error + Send + Sync>),
     #[error("cannot write the report: {0}")]
     Report(#[from] serde_json::Error),
     #[error("the validation layer has {count} message(s); the first: {first}")]
@@ -44,7 +55,18 @@ pub(super) enum CliError {
 
 impl From<CaptureError> for CliError {
     fn from(error: CaptureError) -> Self {
-        Self::Capture(Box::new(error))
+        let memory = match &error {
+            CaptureError::Gpu(GpuError::Allocation { .. }) => true,
+            CaptureError::Gpu(GpuError::Call { result, .. }) => matches!(
+                *result,
+                vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY
+            ),
+            _ => false,
+        };
+        match memory {
+            true => Self::Memory(Box::new(error)),
+            false => Self::Capture(Box::new(error)),
+        }
     }
 }
 
@@ -52,7 +74,22 @@ impl CliError {
     pub(super) fn exit_code(&self) -> u8 {
         match self {
             Self::Request(_) | Self::Usage(_) | Self::Gpu(GpuError::NoDevice { .. }) => USAGE,
+            Self::Capture(error) => match **error {
+                CaptureError::NoSuchImage { .. }
+                | CaptureError::NoSuchPart { .. }
+                | CaptureError::DumpFormat { .. } => USAGE,
+                _ => FAILED,
+            },
+            Self::Frame { source, .. } => source.exit_code(),
             _ => FAILED,
+        }
+    }
+
+    /// Says which frame failed.
+    pub(super) fn in_frame(self, number: u32) -> Self {
+        Self::Frame {
+            number,
+            source: Box::new(self),
         }
     }
 }
@@ -129,5 +166,42 @@ mod tests {
         };
         let error = step("a: b", step("b", step("c\r\n  d", end)));
         assert_eq!(line(&error), "a: b: c d: disk?full");
+    }
+
+    #[test]
+    fn devices_that_do_not_do_fail_in_one_line() {
+        let lacks = |what: &str| vec![what.to_string()];
+        let (device, devices) = ("Old\nThing".into(), lacks("0: A lacks Vulkan 1.3"));
+        let what = lacks("synchronization2 (barriers)");
+        for (error, code, part) in [
+            (GpuError::NoDriver, FAILED, "install"),
+            (GpuError::NoneFits { devices }, FAILED, "A lacks Vulkan 1.3"),
+            (
+                GpuError::Missing { device, what },
+                FAILED,
+                "\"Old Thing\" lacks synchronization2",
+            ),
+        ] {
+            let error = CliError::from(error);
+            let line = line(&error);
+            assert!(line.contains(part) && !line.contains('\n'), "{line}");
+            assert_eq!(error.exit_code(), code, "{line}");
+        }
+    }
+
+    #[test]
+    fn memory_that_runs_out_names_the_remedy_and_the_frame() {
+        let call = GpuError::Call {
+            call: "vkAllocateMemory",
+            object: "picture".into(),
+            result: vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+        };
+        let error = CliError::from(CaptureError::Gpu(call)).in_frame(7);
+        let wanted = "frame 7: vkAllocateMemory failed for picture: ERROR_OUT_OF_DEVICE_MEMORY; a \
+                      smaller --size needs less";
+        assert_eq!(line(&error), wanted);
+        assert_eq!(error.exit_code(), FAILED);
+        let usage = CliError::Usage("wrong".into()).in_frame(1);
+        assert_eq!(usage.exit_code(), USAGE);
     }
 }

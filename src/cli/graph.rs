@@ -11,8 +11,9 @@ const EXAMPLES: &str = "\
 Examples:
   antumbra graph scene.glb
   antumbra graph scene.glb --technique hard --format dot | dot -Tsvg -o frame.svg
+  antumbra graph scene.glb --light lamp --size 1280x720 --format json
 
-No device is used; a driver may ask for somewhat more memory than this says.";
+The names of images are those that `antumbra capture --dump NAME=FILE` takes. No device is used; a driver may ask for somewhat more memory than this says.";
 
 /// Print a frame's passes, barriers and memory, and what was skipped and why
 #[derive(Debug, Args)]

@@ -10,8 +10,14 @@ use super::print_text;
 use crate::gpu::{self, DeviceSummary};
 use crate::shadow::Technique;
 
+const EXAMPLES: &str = "\
+Examples:
+  antumbra info
+  VK_DRIVER_FILES=/usr/share/vulkan/icd.d/lvp_icd.x86_64.json antumbra info";
+
 /// List devices and drivers, what is needed of them and what they lack
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct InfoArgs {}
 
 pub(super) fn run(_args: &InfoArgs) -> Result<(), CliError> {

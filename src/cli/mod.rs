@@ -1,18 +1,25 @@
 //! The command line: arguments in, files and text out.
 //!
 //! Exit codes: 0 done, 1 failed, 2 the command line is wrong, by itself or for the scene or machine
-//! at hand. Every failure prints exactly one line, `error: ..`, to standard error.
+//! at hand, 143 ended by SIGTERM. Every failure prints exactly one line, `error: ..`, to standard error.
 
 mod args;
 mod capture;
+mod compare;
 mod error;
+mod frames;
 mod graph;
 mod info;
 mod outputs;
 mod pipeline_cache;
+mod progress;
+mod reference;
 mod report;
+mod shot;
+mod signals;
 mod summary;
 mod techniques;
+mod template;
 
 use std::ffi::OsString;
 use std::io::{self, Write as _};
@@ -28,10 +35,11 @@ const EXAMPLES: &str = "\
 Examples:
   antumbra capture scene.glb -o picture.png
   antumbra capture scene.glb --visibility vis.exr --light lamp --light-size 0.5
+  antumbra capture scene.glb -o walk_{frame:04}.png --frames 0..48 --fps 24
   antumbra graph scene.glb --format dot | dot -Tsvg -o frame.svg
   antumbra info
 
-Exit codes: 0 done, 1 failed, 2 wrong usage.";
+Exit codes: 0 done, 1 failed, 2 wrong usage, 143 ended by SIGTERM.";
 
 /// Area-light soft shadows for Vulkan: glTF scenes in, pictures and visibility images out.
 #[derive(Debug, Parser)]
@@ -43,21 +51,26 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Capture(capture::CaptureArgs),
+    Capture(Box<capture::CaptureArgs>),
     Info(info::InfoArgs),
     Techniques(techniques::TechniquesArgs),
     Graph(graph::GraphArgs),
+    Reference(Box<reference::ReferenceArgs>),
+    Compare(compare::CompareArgs),
 }
 
 /// Runs the program with `arguments`, of which the first is its own name, and returns its exit
-/// code. Prints to standard output and standard error.
+/// code. Prints to standard output and standard error, and ends the process at SIGTERM.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> ExitCode {
+    signals::handle_termination();
     let result = match Cli::try_parse_from(arguments) {
         Ok(cli) => match cli.command {
             Command::Capture(args) => capture::run(&args),
             Command::Info(args) => info::run(&args),
             Command::Techniques(args) => techniques::run(&args),
             Command::Graph(args) => graph::run(&args),
+            Command::Reference(args) => reference::run(&args),
+            Command::Compare(args) => compare::run(&args),
         },
         Err(error) => match error.kind() {
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {

@@ -1,5 +1,6 @@
 //! The files of a capture: their formats, their names, and writing them when all else is done.
 
+use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -40,54 +41,62 @@ impl ImageFile {
         };
         Ok(Self { path, format })
     }
-
-    /// True if the name differs from light to light.
-    pub(super) fn is_per_light(&self) -> bool {
-        (self.path.to_str()).is_some_and(|path| path.contains(LIGHT))
-    }
-
-    /// This file for the light of that index.
-    pub(super) fn for_light(&self, index: usize) -> Self {
-        let path = match self.path.to_str() {
-            Some(path) => path.replace(LIGHT, &index.to_string()).into(),
-            None => self.path.clone(),
-        };
-        let format = self.format;
-        Self { path, format }
-    }
 }
-
-const LIGHT: &str = "{light}";
 
 /// Refuses outputs that cannot be written, that would replace each other, or that would replace
 /// the scene itself.
 pub(super) fn check(outputs: &[Output], scene: &Path) -> Result<(), CliError> {
-    let mut taken = Vec::new();
-    let scene = fs::canonicalize(scene).ok();
-    for output in outputs {
-        output.check()?;
-        let place = match output {
-            Output::File(path) => Output::File(absolute(path)),
-            Output::Stdout => Output::Stdout,
+    let mut checks = OutputChecks::new(scene);
+    outputs.iter().try_for_each(|output| checks.add(output))
+}
+
+/// Outputs that have been checked, and must not be replaced by further ones.
+struct OutputChecks {
+    scene: Option<PathBuf>,
+    files: HashSet<PathBuf>,
+    /// Folders that are known to take files.
+    folders: HashSet<PathBuf>,
+    stdout: bool,
+}
+
+impl OutputChecks {
+    fn new(scene: &Path) -> Self {
+        Self {
+            scene: fs::canonicalize(scene).ok(),
+            files: HashSet::new(),
+            folders: HashSet::new(),
+            stdout: false,
+        }
+    }
+
+    fn add(&mut self, output: &Output) -> Result<(), CliError> {
+        let twice = || {
+            let text = format!("two outputs would go to {output}; name them differently");
+            Err(CliError::Usage(text))
         };
-        if let Output::File(path) = &place
-            && Some(path) == scene.as_ref()
-        {
+        let Output::File(path) = output else {
+            return match std::mem::replace(&mut self.stdout, true) {
+                true => twice(),
+                false => Ok(()),
+            };
+        };
+        let place = absolute(path);
+        let folder = place.parent().map(Path::to_path_buf).unwrap_or_default();
+        // Trying a folder out costs a file; a new name in a known folder says nothing new.
+        if !self.folders.contains(&folder) || fs::symlink_metadata(path).is_ok() {
+            output.check()?;
+            self.folders.insert(folder);
+        }
+        if Some(&place) == self.scene.as_ref() {
             let text = format!("{output} is the scene; name another output file");
             return Err(CliError::Usage(text));
         }
-        let is_device = |path: &Path| path.metadata().is_ok_and(|meta| !meta.is_file());
-        let replaces = match &place {
-            Output::File(path) => !is_device(path),
-            Output::Stdout => true,
-        };
-        if replaces && taken.contains(&place) {
-            let text = format!("two outputs would go to {output}; name them differently");
-            return Err(CliError::Usage(text));
+        let is_device = place.metadata().is_ok_and(|meta| !meta.is_file());
+        if !is_device && !self.files.insert(place) {
+            return twice();
         }
-        taken.push(place);
+        Ok(())
     }
-    Ok(())
 }
 
 /// The file behind links, or the place in its folder that a new one would take.
@@ -151,17 +160,6 @@ mod tests {
         }
         let stdout = ImageFile::picture("-".into()).map(|file| file.format);
         assert_eq!(stdout, Ok(Format::Png));
-    }
-
-    #[test]
-    fn names_per_light() -> Result<(), String> {
-        let file = ImageFile::by_ending("d/{light}/v_{light}.exr".into())?;
-        assert!(file.is_per_light());
-        assert_eq!(file.for_light(12).path, Path::new("d/12/v_12.exr"));
-        let file = ImageFile::by_ending("v.exr".into())?;
-        assert!(!file.is_per_light());
-        assert_eq!(file.for_light(1), file);
-        Ok(())
     }
 
     #[test]

@@ -1,6 +1,10 @@
 //! What a capture tells about its images.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
+
+use super::shot::Shot;
+use crate::capture::dump_file::ValueRange;
+use crate::capture::output::Output;
 
 /// Least, mean and greatest of a set of values.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +51,83 @@ impl fmt::Display for Stats {
             count => write!(f, "  ({count} values are no number)"),
         }
     }
+}
+
+/// A captured frame in a few lines: what it was rendered with if `driver` is given, then what came
+/// out. `number` is that of a frame among several.
+pub(super) fn summarize(
+    shot: &Shot,
+    driver: Option<&str>,
+    number: Option<u32>,
+    files: &[(Output, Vec<u8>)],
+) -> String {
+    let frame = &shot.captured;
+    let mut text = String::new();
+    let mut row = |name: &str, value: String| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{name:<11}{value}");
+    };
+    if let Some(driver) = driver {
+        row("driver", driver.into());
+        row("size", format!("{}x{}", frame.size[0], frame.size[1]));
+        row("technique", shot.technique.name().into());
+    }
+    match number {
+        Some(number) => row("number", format!("{number} at {:.4} s", shot.seconds)),
+        None if shot.seconds != 0.0 => row("time", format!("{} s", shot.seconds)),
+        None => {}
+    }
+    row("camera", shot.camera.clone());
+    if let Some(spread) = shot.measured.frame() {
+        let first = shot.setup.first_frame;
+        row(
+            "frame",
+            if shot.is_measured {
+                format!(
+                    "{:.3} ms (min {:.3}, max {:.3}; the first {first:.3})",
+                    spread.median, spread.min, spread.max
+                )
+            } else if driver.is_some() {
+                format!("{first:.3} ms (the first of a run)")
+            } else {
+                format!("{first:.3} ms")
+            },
+        );
+    }
+    let rgb = frame.color.iter().flat_map(|pixel| &pixel[..3]).copied();
+    row("picture", Stats::of(rgb).to_string());
+    for (light, scene_light) in frame.lights.iter().zip(&shot.lights) {
+        row(
+            "visibility",
+            format!(
+                "{}  light {} `{}` ({})",
+                Stats::of(light.visibility.iter().copied()),
+                light.light,
+                scene_light.name,
+                scene_light.light.shape
+            ),
+        );
+    }
+    for image in &frame.images {
+        let layers = match image.layers.len() {
+            1 => String::new(),
+            count => format!(", {count} layers"),
+        };
+        row(
+            "dump",
+            format!(
+                "{}  `{}` ({}x{}{layers})",
+                ValueRange::of(image),
+                image.name,
+                image.width,
+                image.height
+            ),
+        );
+    }
+    for (output, bytes) in files {
+        row("wrote", format!("{output} ({} bytes)", bytes.len()));
+    }
+    text
 }
 
 /// The one colour that all pixels have; `None` if there are two.

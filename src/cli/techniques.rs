@@ -9,8 +9,14 @@ use super::error::CliError;
 use super::print_text;
 use crate::shadow::Technique;
 
+const EXAMPLES: &str = "\
+Examples:
+  antumbra techniques
+  antumbra techniques --json | jq -r '.techniques[].name'";
+
 /// List every technique with its light shapes, options, defaults and paper
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct TechniquesArgs {
     /// As JSON
     #[arg(long)]

@@ -235,6 +235,42 @@ impl<'f> Graph<'f> {
         self.decl.passes.len()
     }
 
+    /// The newest version of the first image that was declared under `name` for this frame and that
+    /// a pass writes. Images of the host's are not looked at.
+    pub fn image_named(&self, name: &str) -> Option<ImageId> {
+        let mut images = self.written_images();
+        images.find(|(_, r)| r.name == name).map(|(index, r)| {
+            ImageId(Version {
+                graph: self.decl.stamp,
+                resource: index as u32,
+                version: r.version,
+            })
+        })
+    }
+
+    /// Names of the images that [`image_named`](Self::image_named) finds, in order of declaration.
+    pub fn image_names(&self) -> impl Iterator<Item = &str> {
+        self.written_images().map(|(_, r)| r.name.as_ref())
+    }
+
+    /// Shape of an image of this graph; `None` for an id of another.
+    pub fn image_desc(&self, id: ImageId) -> Option<ImageDesc> {
+        let resource = self.decl.resources.get(id.0.resource as usize)?;
+        match resource.kind {
+            Kind::Image(desc) if id.0.graph == self.decl.stamp => Some(desc),
+            _ => None,
+        }
+    }
+
+    fn written_images(&self) -> impl Iterator<Item = (usize, &ResourceDecl)> {
+        let all = self.decl.resources.iter().enumerate();
+        all.filter(|(_, r)| {
+            matches!(r.kind, Kind::Image(_))
+                && matches!(r.origin, Origin::Transient | Origin::HistoryCurrent { .. })
+                && r.version > 0
+        })
+    }
+
     /// Keeps a transient: its last contents are a result of the frame and stay in memory until the
     /// frame's end.
     pub fn keep<R: ResourceId>(&mut self, id: R) {

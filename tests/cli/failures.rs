@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use antumbra::capture::exr;
 use serde_json::json;
 
-use super::{
+use super::program::{
     COURT, Result, SPHERE, antumbra, assert_fails, capture, capture_command, changed_scene, names,
     node, run,
 };
@@ -22,7 +22,40 @@ fn wrong_usage_exits_2() -> Result {
         (&["capture"], &["SCENE"]),
         (&["capture", SPHERE, "second"], &["second"]),
         (&["capture", SPHERE, "--budget-ms", "3"], &["--budget-ms"]),
-        (&["capture", SPHERE, "--time", "1"], &["--time"]),
+        (&["capture", SPHERE, "--time", "nan"], &["--time", "nan"]),
+        (&["capture", SPHERE, "--time", "inf"], &["--time"]),
+        (&["capture", SPHERE, "--time", "soon"], &["seconds"]),
+        (&["capture", SPHERE, "--fps", "24"], &["--frames"]),
+        (
+            &["capture", SPHERE, "--frames", "0..2", "--fps", "0"],
+            &["--fps"],
+        ),
+        (&["capture", SPHERE, "--frames", "3..3"], &["3..3", "above"]),
+        (&["capture", SPHERE, "--frames", "5..2"], &["5..2"]),
+        (&["capture", SPHERE, "--frames", "-1..2"], &["A..B"]),
+        (&["capture", SPHERE, "--frames", "3"], &["A..B"]),
+        (
+            &["capture", SPHERE, "--frames", "0..999999999"],
+            &["100000"],
+        ),
+        (
+            &["capture", SPHERE, "--frames", "0..2", "-o", &picture],
+            &["2 frames", "{frame:04}"],
+        ),
+        (
+            &["capture", SPHERE, "--frames", "0..2", "-o", "-"],
+            &["2 frames"],
+        ),
+        (
+            &["capture", SPHERE, "-o", "a{frame:4}.png"],
+            &["{frame:04}"],
+        ),
+        (
+            &["capture", SPHERE, "--dump", "depth"],
+            &["--dump", "NAME=FILE"],
+        ),
+        (&["capture", SPHERE, "--dump", "depth=d.txt"], &[".exr"]),
+        (&["capture", SPHERE, "--dump", "depth=-"], &[".exr"]),
         (
             &["capture", SPHERE, "--technique", "magic"],
             &["unknown technique `magic`", "hard"],
@@ -116,6 +149,13 @@ fn scenes_that_cannot_be_read_exit_1() -> Result {
             });
     })?;
     fs::rename(dark, at("dark.gltf"))?;
+    let bare = changed_scene(folder.path(), |scene| {
+        let nodes = scene["nodes"].as_array_mut().into_iter().flatten();
+        for node in nodes.filter_map(|node| node.as_object_mut()) {
+            node.remove("mesh");
+        }
+    })?;
+    fs::rename(bare, at("bare.gltf"))?;
     let before = names(folder.path())?;
     let picture = at("picture.png");
     for (scene, parts) in [
@@ -127,6 +167,7 @@ fn scenes_that_cannot_be_read_exit_1() -> Result {
         ("two\nlines.gltf", &["lines.gltf", "glTF"]),
         ("broken.gltf", &["broken.gltf", "JSON"]),
         ("dark.gltf", &["dark.gltf", "no light"]),
+        ("bare.gltf", &["bare.gltf", "no triangles"]),
     ] {
         let output = capture_command(at(scene), "8x8")
             .arg("-o")
@@ -152,6 +193,19 @@ fn outputs_that_cannot_be_written_exit_1() -> Result {
     if cfg!(target_os = "linux") {
         // Not even root makes files there.
         cases.push((PathBuf::from("/proc/antumbra.png"), "/proc/antumbra.png"));
+        // A device that takes nothing: the disk is full.
+        let links = tempfile::tempdir()?;
+        let full = links.path().join("full.png");
+        std::os::unix::fs::symlink("/dev/full", &full)?;
+        let report = at("report.json");
+        let output = capture_command(SPHERE, "8x8")
+            .arg("--visibility")
+            .arg(&full)
+            .arg("--report")
+            .arg(&report)
+            .output()?;
+        assert_fails(&output, 1, &["full.png", "space"]);
+        assert!(!report.exists());
     }
     for (path, part) in cases {
         for flag in ["-o", "--visibility"] {

@@ -1,0 +1,312 @@
+//! Whole frames on a device of our own, brought back to memory.
+
+use super::dump::{CapturedImage, Dump, Source};
+use super::frame::{CaptureError, CapturedFrame, CapturedLight, FrameRequest, check, declare};
+use crate::gpu::{Buffer, Gpu, GpuError, MemoryLocation, ValidationMessage};
+use crate::graph::{
+    Access, BufferDesc, BufferPart, BufferState, FrameCache, FrameReport, Graph, HostBuffer,
+    ImagePart, PassKind, Plan,
+};
+use crate::renderer::{Frame, SceneBuffers};
+use crate::scene::Scene;
+use ash::vk;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Name of the passes that copy images to the host: no part of the frame.
+const READ_BACK: &str = "read back";
+
+/// Renders frames of a scene, and of the scenes that follow it in an animation.
+pub struct FrameRenderer<'s> {
+    gpu: Gpu,
+    scene: Cow<'s, Scene>,
+    buffers: SceneBuffers,
+    cache: FrameCache,
+}
+
+impl<'s> FrameRenderer<'s> {
+    /// Uploads a scene to a device of our own. The device is destroyed if that fails.
+    pub fn new(gpu: Gpu, scene: &'s Scene) -> Result<Self, CaptureError> {
+        Self::with(gpu, Cow::Borrowed(scene))
+    }
+
+    fn with(mut gpu: Gpu, scene: Cow<'s, Scene>) -> Result<Self, CaptureError> {
+        match gpu.run(|gpu, cmd| SceneBuffers::upload(gpu, cmd, &scene)) {
+            Ok(buffers) => Ok(Self {
+                gpu,
+                scene,
+                buffers,
+                cache: FrameCache::new(),
+            }),
+            Err(error) => {
+                if let Err(second) = gpu.destroy() {
+                    log::warn!("after a failed upload: {second}");
+                }
+                Err(error.into())
+            }
+        }
+    }
+
+    /// The scene that [`render`](Self::render) renders.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Goes on with another scene, such as the next moment of an animation. Device, pipelines and
+    /// transient memory stay, and so does what is on the device if only lights and cameras differ;
+    /// returns whether it was uploaded anew. After an error the renderer is as it was.
+    pub fn set_scene(&mut self, scene: Scene) -> Result<bool, CaptureError> {
+        let old = &*self.scene;
+        let same = old.primitives == scene.primitives
+            && old.materials == scene.materials
+            && old.images == scene.images
+            && old.bounds == scene.bounds;
+        if !same {
+            let upload = |gpu: &mut Gpu, cmd| SceneBuffers::upload(gpu, cmd, &scene);
+            let buffers = self.gpu.run(upload)?;
+            // `run` has waited: no frame uses the old ones any more.
+            std::mem::replace(&mut self.buffers, buffers).destroy(&mut self.gpu);
+        }
+        self.scene = Cow::Owned(scene);
+        Ok(!same)
+    }
+
+    /// Renders one frame and waits for it.
+    pub fn render(&mut self, request: &FrameRequest) -> Result<CapturedFrame, CaptureError> {
+        self.render_with_images(request, &[])
+    }
+
+    /// As [`render`](Self::render), and brings back images of the frame by name: `depth` (metres
+    /// along the view direction, 0 where nothing was hit), `normal` and `shading_normal` (world
+    /// axes), `visibility` (of the first light), or any image that the frame writes, under its name
+    /// in the [`Plan`]; `NAME[LAYER]` and `NAME[LAYER,LEVEL]` are parts of it.
+    ///
+    /// # Errors
+    /// As for [`render`](Self::render), and [`CaptureError::NoSuchImage`],
+    /// [`CaptureError::NoSuchPart`] or [`CaptureError::DumpFormat`].
+    pub fn render_with_images(
+        &mut self,
+        request: &FrameRequest,
+        names: &[&str],
+    ) -> Result<CapturedFrame, CaptureError> {
+        let most = self.gpu.info().limits.max_image_dimension2_d;
+        let lights = check(&self.scene, request, most)?;
+
+        let start = Instant::now();
+        let pipelines = self.gpu.pipelines_created();
+        let mut graph = Graph::continuing(self.cache.history());
+        let frame = declare(&mut graph, &self.buffers, request, &lights);
+        let wanted = ReadBacks::new(&graph, &frame, request, names)?;
+        let aside = Instant::now();
+        let (usage, location) = (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu);
+        let target = (self.gpu).create_buffer(READ_BACK, wanted.bytes, usage, location)?;
+        let aside_ms = milliseconds(aside);
+
+        wanted.declare(&mut graph, &target);
+        let recorded = run(&mut self.gpu, &mut self.cache, graph);
+        let total_ms = milliseconds(start);
+        let result = recorded.map(|(plan, report)| {
+            let mut passes = self.gpu.collect_timings();
+            let copies_ms: f64 = (passes.iter())
+                .filter(|(name, _)| name == READ_BACK)
+                .map(|(_, ms)| ms)
+                .sum();
+            passes.retain(|(name, _)| name != READ_BACK);
+            let created = self.gpu.pipelines_created() - pipelines;
+            let bytes = target.mapped().unwrap_or_default();
+            CapturedFrame {
+                size: request.size,
+                color: wanted.take(0, bytes),
+                lights: wanted.lights(request, &frame, &plan, bytes),
+                images: wanted.images(bytes),
+                counters: self.counters(&plan, &report, created),
+                passes,
+                frame_ms: (total_ms - aside_ms - copies_ms).max(0.0),
+                plan,
+                report,
+            }
+        });
+        self.gpu.destroy_buffer(target);
+        result
+    }
+
+    fn counters(
+        &self,
+        plan: &Plan,
+        report: &FrameReport,
+        pipelines: usize,
+    ) -> BTreeMap<String, u64> {
+        let counts = [
+            ("barriers", report.barriers as u64),
+            ("passes", report.passes.len() as u64),
+            ("passes_culled", plan.culled.len() as u64),
+            ("pipelines_created", pipelines as u64),
+            ("transient_bytes", plan.peak_bytes()),
+            ("transient_bytes_unaliased", plan.unaliased_bytes()),
+            ("triangles", self.buffers.triangle_count() as u64),
+            (
+                "triangles_without_area",
+                self.buffers.degenerate_count() as u64,
+            ),
+        ];
+        counts.map(|(name, count)| (name.to_string(), count)).into()
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Gives everything back; returns what the validation layer said, leaks included.
+    pub fn destroy(mut self) -> Result<Vec<ValidationMessage>, GpuError> {
+        self.cache.destroy(&mut self.gpu);
+        self.buffers.destroy(&mut self.gpu);
+        self.gpu.destroy()
+    }
+}
+
+impl FrameRenderer<'static> {
+    /// As [`new`](Self::new), with a scene of its own.
+    pub fn owning(gpu: Gpu, scene: Scene) -> Result<Self, CaptureError> {
+        Self::with(gpu, Cow::Owned(scene))
+    }
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1.0e3
+}
+
+/// Plans and records a frame, submits it and waits.
+fn run(
+    gpu: &mut Gpu,
+    cache: &mut FrameCache,
+    graph: Graph<'_>,
+) -> Result<(Plan, FrameReport), CaptureError> {
+    let compiled = graph.compile(gpu)?;
+    let plan = compiled.plan().clone();
+    let report = gpu.run(|gpu, cmd| compiled.record(gpu, cache, cmd))?;
+    Ok((plan, report))
+}
+
+/// What is copied to the host, and where in the buffer: the picture, each light's visibility, then
+/// the images asked for by name.
+struct ReadBacks {
+    sources: Vec<(Source, u64)>,
+    dumps: Vec<Dump>,
+    /// Number of sources before those of the dumps.
+    fixed: usize,
+    /// Size of the buffer.
+    bytes: u64,
+}
+
+impl ReadBacks {
+    fn new(
+        graph: &Graph<'_>,
+        frame: &Frame,
+        request: &FrameRequest,
+        names: &[&str],
+    ) -> Result<Self, CaptureError> {
+        let find = |name: &&str| Dump::find(graph, frame, name);
+        let dumps: Vec<Dump> = names.iter().map(find).collect::<Result<_, _>>()?;
+        let [width, height] = request.size;
+        let picture = |image, texel_bytes| Source {
+            image,
+            mip: 0,
+            first_layer: 0,
+            layers: 1,
+            width,
+            height,
+            texel_bytes,
+        };
+        let mut sources = vec![picture(frame.radiance, 16)];
+        sources.extend(frame.visibility.iter().map(|image| picture(*image, 4)));
+        let fixed = sources.len();
+        sources.extend(dumps.iter().flat_map(|dump| dump.sources.iter().copied()));
+        let mut bytes = 0u64;
+        let place = |source: Source| {
+            // Copies start at a multiple of the texel's size.
+            let offset = bytes.next_multiple_of(16);
+            bytes = offset + source.bytes();
+            (source, offset)
+        };
+        Ok(Self {
+            sources: sources.into_iter().map(place).collect(),
+            dumps,
+            fixed,
+            bytes,
+        })
+    }
+
+    /// Declares the copies. They keep what they read in the frame and in memory.
+    fn declare(&self, graph: &mut Graph<'_>, target: &Buffer) {
+        let host = HostBuffer {
+            buffer: target.raw,
+            desc: BufferDesc { size: target.size },
+            usage: target.usage,
+            enter: BufferState::IDLE,
+            leave: BufferState::HOST_READ,
+        };
+        let mut buffer = graph.import_buffer(READ_BACK, host);
+        for &(source, offset) in &self.sources {
+            let (image, size) = (source.image, source.bytes());
+            let part = ImagePart {
+                base_mip: source.mip,
+                mips: 1,
+                base_layer: source.first_layer,
+                layers: source.layers,
+            };
+            let mut pass = graph.pass(READ_BACK, PassKind::Transfer);
+            pass.read_part(image, part, Access::CopyRead);
+            let place = BufferPart { offset, size };
+            buffer = pass.overwrite_part(buffer, place, Access::CopyWrite);
+            let target = buffer;
+            pass.record(move |ctx| ctx.copy_image_to_buffer(image, part, target, offset));
+        }
+    }
+
+    fn bytes_of<'b>(&self, at: usize, bytes: &'b [u8]) -> &'b [u8] {
+        let Some(&(source, offset)) = self.sources.get(at) else {
+            return &[];
+        };
+        let range = offset as usize..(offset + source.bytes()) as usize;
+        bytes.get(range).unwrap_or_default()
+    }
+
+    fn take<T: bytemuck::Pod>(&self, at: usize, bytes: &[u8]) -> Vec<T> {
+        bytemuck::pod_collect_to_vec(self.bytes_of(at, bytes))
+    }
+
+    /// The lights, with the passes that make their visibility.
+    fn lights(
+        &self,
+        request: &FrameRequest,
+        frame: &Frame,
+        plan: &Plan,
+        bytes: &[u8],
+    ) -> Vec<CapturedLight> {
+        let ranges = request.lights.iter().zip(&frame.visibility_passes);
+        let lights = ranges.enumerate().map(|(at, (light, range))| {
+            let passes = plan.passes.iter();
+            let own = passes.filter(|pass| range.contains(&pass.declared));
+            CapturedLight {
+                light: *light,
+                visibility: self.take(1 + at, bytes),
+                passes: own.map(|pass| pass.name.to_string()).collect(),
+            }
+        });
+        lights.collect()
+    }
+
+    fn images(&self, bytes: &[u8]) -> Vec<CapturedImage> {
+        let mut at = self.fixed;
+        let images = self.dumps.iter().map(|dump| {
+            let parts: Vec<&[u8]> = (at..at + dump.sources.len())
+                .map(|at| self.bytes_of(at, bytes))
+                .collect();
+            at += dump.sources.len();
+            dump.decode(&parts)
+        });
+        images.collect()
+    }
+}

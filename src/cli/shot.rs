@@ -1,0 +1,290 @@
+//! One frame of a capture: rendered, perhaps measured, and turned into files.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::str::FromStr;
+
+use serde_json::Value;
+
+use super::error::CliError;
+use super::outputs::{Format, ImageFile};
+use super::report::{ImageEntry, Measurements, PeakBytes, SetupTimes};
+use super::summary::single_value;
+use super::template::ImageTemplate;
+use crate::capture::output::{Output, OutputError};
+use crate::capture::{
+    CapturedFrame, CapturedImage, FrameRenderer, FrameRequest, ImageContent, Samples, dump_file,
+    exposure, exr, png,
+};
+use crate::scene::SceneLight;
+use crate::shadow::Technique;
+
+/// `NAME=FILE` of `--dump`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct DumpArg {
+    pub(super) name: String,
+    pub(super) file: ImageTemplate,
+}
+
+impl FromStr for DumpArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('=').filter(|(name, _)| !name.is_empty());
+        let Some((name, file)) = parts else {
+            return Err("give NAME=FILE, such as depth=depth.exr".into());
+        };
+        Ok(Self {
+            name: name.into(),
+            file: ImageTemplate::by_ending(file.into())?,
+        })
+    }
+}
+
+/// An image to write and where to.
+#[derive(Clone, Debug)]
+pub(super) struct Wanted {
+    pub(super) content: Content,
+    pub(super) file: ImageFile,
+}
+
+/// What an image shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Content {
+    /// The shaded picture.
+    Picture,
+    /// Visibility of the light of that index.
+    Visibility(usize),
+    /// The same, as `--dump` writes it.
+    DumpedVisibility(usize),
+    /// The `--dump` of that place.
+    Dump(usize),
+}
+
+/// How a frame is rendered.
+pub(super) struct Plan<'a> {
+    pub(super) number: u32,
+    /// Its moment.
+    pub(super) seconds: f64,
+    /// What reading its scene and bringing it to the device took.
+    pub(super) load_ms: f64,
+    /// Warm-up and measured frames; `None` to render once.
+    pub(super) repeats: Option<(u32, u32)>,
+    /// Names of images to bring back.
+    pub(super) dumps: Vec<&'a str>,
+}
+
+/// A rendered frame.
+pub(super) struct Shot {
+    pub(super) number: u32,
+    pub(super) seconds: f64,
+    pub(super) captured: CapturedFrame,
+    pub(super) measured: Measurements,
+    pub(super) is_measured: bool,
+    pub(super) setup: SetupTimes,
+    /// The frame's lights, in the order of the captured ones.
+    pub(super) lights: Vec<SceneLight>,
+    pub(super) technique: Technique,
+    /// What was looked at, for people.
+    pub(super) camera: String,
+    peak: PeakBytes,
+}
+
+impl Shot {
+    pub(super) fn take(
+        plan: Plan<'_>,
+        request: &FrameRequest,
+        renderer: &mut FrameRenderer<'_>,
+    ) -> Result<Self, CliError> {
+        let mut captured = renderer.render_with_images(request, &plan.dumps)?;
+        let first_frame = captured.frame_ms;
+        let mut measured = Measurements::default();
+        match plan.repeats {
+            None => measured.add(&captured),
+            Some((warm_up, count)) => {
+                // Measured frames are those that would be rendered without dumps.
+                let images = std::mem::take(&mut captured.images);
+                for number in 1..warm_up + count {
+                    captured = renderer.render(request)?;
+                    if number >= warm_up {
+                        measured.add(&captured);
+                    }
+                }
+                captured.images = images;
+            }
+        }
+        let memory = renderer.gpu().memory_use();
+        let scene = renderer.scene();
+        let lights = request.lights.iter();
+        Ok(Self {
+            number: plan.number,
+            seconds: plan.seconds,
+            measured,
+            is_measured: plan.repeats.is_some(),
+            setup: SetupTimes {
+                load: plan.load_ms,
+                pipelines: None,
+                first_frame,
+            },
+            lights: lights.map(|&light| scene.lights[light].clone()).collect(),
+            technique: request.technique,
+            camera: camera_text(request, scene.rebase_origin),
+            peak: PeakBytes {
+                device: memory.peak_device_bytes,
+                host: memory.peak_host_bytes,
+            },
+            captured,
+        })
+    }
+
+    /// A picture of one single colour is what a broken set-up looks like.
+    pub(super) fn refuse_single_value(&self) -> Result<(), CliError> {
+        match single_value(&self.captured.color) {
+            Some(value) => Err(CliError::Uniform { value }),
+            None => Ok(()),
+        }
+    }
+
+    /// The report's entries: one a light.
+    pub(super) fn entries<'s>(
+        &'s self,
+        scene: &'s Path,
+        driver: &'s str,
+    ) -> impl Iterator<Item = ImageEntry> + 's {
+        let (frame, measured) = (&self.captured, &self.measured);
+        let lights = frame.lights.iter().zip(&self.lights);
+        lights.map(move |(light, scene_light)| ImageEntry {
+            scene: scene.display().to_string(),
+            frame: u64::from(self.number),
+            light: scene_light.name.clone(),
+            technique: self.technique.name(),
+            options: options(self.technique),
+            driver: driver.to_owned(),
+            width: frame.size[0],
+            height: frame.size[1],
+            frame_ms: measured.frame(),
+            frame_ms_static: None,
+            visibility_ms: measured.sum_of(&light.passes),
+            passes: measured.passes(frame),
+            setup_ms: self.setup,
+            peak_bytes: self.peak,
+            counters: frame.counters.clone(),
+        })
+    }
+
+    /// The bytes of a file.
+    pub(super) fn encode(&self, wanted: &Wanted) -> Result<(Output, Vec<u8>), CliError> {
+        let format = wanted.file.format;
+        let bytes = match wanted.content {
+            Content::Picture => self.encode_picture(format)?,
+            Content::Visibility(light) => {
+                let [width, height] = self.captured.size;
+                let values = self.visibility(light);
+                match format {
+                    Format::Exr => exr::encode_y(width, height, values)?,
+                    Format::Png => png::encode_grey16(width, height, values)?,
+                }
+            }
+            Content::DumpedVisibility(light) => {
+                let [width, height] = self.captured.size;
+                let image = CapturedImage {
+                    name: "visibility".into(),
+                    width,
+                    height,
+                    layers: vec![0],
+                    content: ImageContent::Values,
+                    planes: vec![Samples::Float(self.visibility(light).to_vec())],
+                };
+                encode_dump(&image, format)?
+            }
+            Content::Dump(at) => encode_dump(&self.captured.images[at], format)?,
+        };
+        Ok((Output::from(wanted.file.path.clone()), bytes))
+    }
+
+    /// The renderer makes the visibility of every light that it was asked for.
+    fn visibility(&self, light: usize) -> &[f32] {
+        let mut lights = self.captured.lights.iter();
+        let found = lights.find(|captured| captured.light == light);
+        found.map(|light| &light.visibility[..]).unwrap_or_default()
+    }
+
+    fn encode_picture(&self, format: Format) -> Result<Vec<u8>, OutputError> {
+        let frame = &self.captured;
+        let [width, height] = frame.size;
+        let scale = match format {
+            Format::Png => exposure(&frame.color),
+            Format::Exr => 1.0,
+        };
+        let rgb: Vec<[f32; 3]> = (frame.color.iter())
+            .map(|pixel| [pixel[0] * scale, pixel[1] * scale, pixel[2] * scale])
+            .collect();
+        match format {
+            Format::Png => png::encode_linear_rgb(width, height, &rgb),
+            Format::Exr => exr::encode_rgb(width, height, &rgb),
+        }
+    }
+}
+
+/// Every option with its value, numbers as such.
+fn options(technique: Technique) -> BTreeMap<String, Value> {
+    let values = technique.option_values().into_iter();
+    let json = values.map(|(name, value)| {
+        let number = value.parse().ok().filter(|v: &f64| v.is_finite());
+        let json = match (value.parse::<u64>(), number) {
+            (Ok(whole), _) => Value::from(whole),
+            (_, Some(number)) => Value::from(number),
+            _ => Value::from(value),
+        };
+        (name.to_string(), json)
+    });
+    json.collect()
+}
+
+fn encode_dump(image: &CapturedImage, format: Format) -> Result<Vec<u8>, OutputError> {
+    match format {
+        Format::Exr => dump_file::to_exr(image.clone()),
+        Format::Png => dump_file::to_png(image),
+    }
+}
+
+fn camera_text(request: &FrameRequest, rebase_origin: glam::DVec3) -> String {
+    let camera = &request.camera;
+    if camera.node.is_some() {
+        return format!("{} `{}`", camera.index, camera.name);
+    }
+    let eye = camera.position.as_dvec3() + rebase_origin;
+    let forward = camera.forward;
+    format!(
+        "none in the scene; the whole of it from ({:.4}, {:.4}, {:.4}) along ({:.4}, {:.4}, {:.4}), \
+         yfov {:.4} radians",
+        eye.x, eye.y, eye.z, forward.x, forward.y, forward.z, camera.yfov
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dumps_are_a_name_and_a_file() {
+        let parse = |text: &str| text.parse::<DumpArg>();
+        let map = parse("hard.map_depth 0:lamp[2]=a=b.exr");
+        let map = map.map(|dump| (dump.name, dump.file.text()));
+        assert_eq!(
+            map,
+            Ok(("hard.map_depth 0:lamp[2]".into(), "a=b.exr".into()))
+        );
+        for bad in [
+            "",
+            "depth",
+            "=a.exr",
+            "depth=",
+            "depth=a.jpg",
+            "depth=-",
+            "depth=a{frame:}.exr",
+        ] {
+            assert!(parse(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -143,6 +143,14 @@ pub enum SceneError {
     },
 }
 
+/// `` `name` `` after `kind` and `index`, short and on one line.
+pub(super) fn element(kind: &str, index: usize, name: &str) -> String {
+    match name {
+        "" => format!("{kind} {index}"),
+        name => format!("{kind} {index} `{}`", shorten(name)),
+    }
+}
+
 /// At most 60 characters of `text`, none of them a control character.
 pub(super) fn shorten(text: &str) -> String {
     const LONGEST: usize = 60;

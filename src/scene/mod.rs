@@ -20,7 +20,7 @@ use std::path::PathBuf;
 use glam::{DVec3, Vec2, Vec3};
 
 use crate::light::AreaLight;
-use error::shorten;
+use error::{element, shorten};
 
 pub use bounds::Aabb;
 pub use camera::{Ray, SceneCamera};
@@ -100,7 +100,8 @@ pub struct SceneLight {
 impl Scene {
     /// Reads a glTF 2.0 file, .glb or .gltf, told apart by content.
     ///
-    /// Images are not read. External buffers must lie in the folder of the file or below it.
+    /// External buffers and images (PNG, JPEG) must lie in the folder of the file or below it. An
+    /// animated file is shown at [`LoadOptions::time`]; [`SceneFile`] shows it at several moments.
     ///
     /// # Errors
     /// A [`SceneError`] that names the file and the element: a file that is missing, no glTF,
@@ -146,10 +147,10 @@ impl Scene {
         };
         let mut bounds = Aabb::EMPTY;
         for (i, primitive) in self.primitives.iter().enumerate() {
-            let element = || format!("primitive {i} `{}`", shorten(&primitive.name));
+            let label = || element("primitive", i, &primitive.name);
             if primitive.material >= self.materials.len() {
                 let reason = format!("it names material {}, which is missing", primitive.material);
-                return Err(invalid(element(), reason));
+                return Err(invalid(label(), reason));
             }
             let (vertices, normals) = (primitive.positions.len(), primitive.normals.len());
             if vertices != normals || primitive.indices.len() % 3 != 0 {
@@ -158,12 +159,12 @@ impl Scene {
                      normal a position and three indices a triangle",
                     primitive.indices.len()
                 );
-                return Err(invalid(element(), reason));
+                return Err(invalid(label(), reason));
             }
             let uvs = primitive.uvs.len();
             if uvs != 0 && uvs != vertices {
                 let reason = format!("it has {vertices} positions and {uvs} texture coordinates");
-                return Err(invalid(element(), reason));
+                return Err(invalid(label(), reason));
             }
             for (vertex, position) in primitive.positions.iter().enumerate() {
                 // Written so that NaN fails.
@@ -172,26 +173,25 @@ impl Scene {
                         "vertex {vertex} lies at {position}; coordinates must be finite and at \
                          most {MAX_COORDINATE:e} m from the scene's origin"
                     );
-                    return Err(invalid(element(), reason));
+                    return Err(invalid(label(), reason));
                 }
             }
             let is_unit = |n: &Vec3| (n.length_squared() - 1.0).abs() < 1.0e-2;
             if let Some(vertex) = primitive.normals.iter().position(|n| !is_unit(n)) {
                 let reason = format!("the normal of vertex {vertex} is not of length 1");
-                return Err(invalid(element(), reason));
+                return Err(invalid(label(), reason));
             }
             for (at, &index) in primitive.indices.iter().enumerate() {
                 let Some(position) = primitive.positions.get(index as usize) else {
                     let reason = format!("index {at} names vertex {index} of {vertices}");
-                    return Err(invalid(element(), reason));
+                    return Err(invalid(label(), reason));
                 };
                 bounds.insert(*position);
             }
         }
         for (i, material) in self.materials.iter().enumerate() {
             if let Some(reason) = self.material_fault(material) {
-                let element = format!("material {i} `{}`", shorten(&material.name));
-                return Err(invalid(element, reason));
+                return Err(invalid(element("material", i, &material.name), reason));
             }
         }
         for (i, image) in self.images.iter().enumerate() {
@@ -203,18 +203,12 @@ impl Scene {
                     image.height,
                     image.texels.len()
                 );
-                return Err(invalid(
-                    format!("image {i} `{}`", shorten(&image.name)),
-                    reason,
-                ));
+                return Err(invalid(element("image", i, &image.name), reason));
             }
         }
         for (i, camera) in self.cameras.iter().enumerate() {
             if let Some(fault) = camera.fault() {
-                return Err(invalid(
-                    format!("camera {i} `{}`", shorten(&camera.name)),
-                    fault,
-                ));
+                return Err(invalid(element("camera", i, &camera.name), fault));
             }
         }
         for light in &self.lights {

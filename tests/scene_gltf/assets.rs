@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use antumbra::light::LightShape;
-use antumbra::scene::{LoadOptions, Scene};
+use antumbra::scene::{LoadOptions, Primitive, Scene, SceneFile};
 use glam::{DVec3, UVec2, Vec3};
 
 use super::{Result, area_vector, make_assets, triangles};
@@ -17,6 +17,27 @@ fn committed_assets_are_what_the_maker_writes() -> Result {
             committed == bytes,
             "assets/{name} is stale; run `cargo run --example make_assets`"
         );
+    }
+    Ok(())
+}
+
+#[test]
+fn every_asset_loads_at_every_moment() -> Result {
+    for (name, bytes) in make_assets::scenes() {
+        let file = SceneFile::from_slice(name, bytes, &LoadOptions::default())?;
+        let start = file.scene_at(0.0)?;
+        assert!(
+            !start.cameras.is_empty() && !start.lights.is_empty(),
+            "{name}"
+        );
+        let middle = file.scene_at(0.4 * file.duration())?;
+        assert_eq!(file.is_animated(), start != middle, "{name}");
+        assert_eq!(start.rebase_origin, middle.rebase_origin, "{name}");
+        assert_eq!(start.triangle_count(), middle.triangle_count(), "{name}");
+        let textured = |p: &Primitive| start.materials[p.material].base_texture.is_some();
+        for primitive in &start.primitives {
+            assert_eq!(textured(primitive), !primitive.uvs.is_empty(), "{name}");
+        }
     }
     Ok(())
 }

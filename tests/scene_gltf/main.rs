@@ -2,7 +2,7 @@
 //! broken files. Needs no GPU.
 #![cfg(feature = "cli")]
 
-#[path = "../../examples/make_assets.rs"]
+#[path = "../../examples/make_assets/main.rs"]
 mod make_assets;
 
 mod animation;

@@ -1,6 +1,7 @@
 //! Typed reads from accessors. Every range is checked before anything is read or allocated.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 
 use gltf::accessor::{DataType, Dimensions};
 use gltf::{Accessor, buffer};
@@ -11,8 +12,10 @@ use super::{SceneError, Source, element};
 pub(super) struct Accessors<'a> {
     pub(super) source: Source<'a>,
     pub(super) buffers: &'a [Cow<'a, [u8]>],
-    /// Largest count of elements.
+    /// Largest count of elements of one accessor.
     pub(super) limit: u64,
+    /// Elements that may still be read in all: a file may name the same bytes many times.
+    pub(super) left: Cell<u64>,
 }
 
 /// Equally spaced elements of `size` bytes.
@@ -70,13 +73,15 @@ impl Accessors<'_> {
         decode: impl Fn(&[u8]) -> T,
     ) -> Result<Vec<T>, SceneError> {
         let (count, size) = (accessor.count(), accessor.size());
-        if count as u64 > self.limit {
+        let left = self.left.get().checked_sub(count as u64);
+        let (true, Some(left)) = (count as u64 <= self.limit, left) else {
             return Err(SceneError::TooLarge {
                 file: self.source.label(),
                 element: element("accessor", accessor.index(), accessor.name()),
                 limit: self.limit,
             });
-        }
+        };
+        self.left.set(left);
         let mut values = match accessor.view() {
             Some(view) => {
                 let data = self.slice(accessor, &view, accessor.offset(), count, size)?;
@@ -168,7 +173,7 @@ impl Accessors<'_> {
         })
     }
 
-    fn fault(&self, accessor: &Accessor<'_>, reason: impl Into<String>) -> SceneError {
+    pub(super) fn fault(&self, accessor: &Accessor<'_>, reason: impl Into<String>) -> SceneError {
         let element = element("accessor", accessor.index(), accessor.name());
         self.source.invalid(element, reason)
     }

@@ -24,7 +24,7 @@ pub(super) fn load<'a>(
         let length = buffer.length();
         let data = match (buffer.source(), bin) {
             (gltf::buffer::Source::Uri(uri), _) => {
-                let data = read_uri(source.path, uri, length);
+                let data = read_uri(source.path, uri, length as u64);
                 Cow::Owned(data.map_err(|error| SceneError::Buffer {
                     file: source.label(),
                     element: element.clone(),
@@ -47,7 +47,8 @@ pub(super) fn load<'a>(
     Ok(buffers)
 }
 
-fn read_uri(scene: &Path, uri: &str, length: usize) -> io::Result<Vec<u8>> {
+/// The bytes behind `uri`; of a file at most `length`.
+pub(super) fn read_uri(scene: &Path, uri: &str, length: u64) -> io::Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
         return decode_data_uri(data);
     }
@@ -58,7 +59,7 @@ fn read_uri(scene: &Path, uri: &str, length: usize) -> io::Result<Vec<u8>> {
         return Err(invalid("not a regular file"));
     }
     let mut data = Vec::new();
-    file.take(length as u64).read_to_end(&mut data)?;
+    file.take(length).read_to_end(&mut data)?;
     Ok(data)
 }
 

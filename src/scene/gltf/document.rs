@@ -1,9 +1,12 @@
 //! The JSON: parsed and validated by the `gltf` crate, plus what that crate does not keep.
 
+use std::collections::BTreeMap;
+
 use gltf::Document;
 use gltf::json::validation::{Checked, Validate};
 use gltf::json::{self, Root};
 use serde::Deserialize;
+use serde_json::Value;
 
 use super::{SceneError, Source, container, shorten};
 
@@ -28,6 +31,16 @@ pub(super) struct SideNode {
 pub(super) struct NodeExtensions {
     #[serde(rename = "EXT_lights_area")]
     pub(super) area_light: Option<AreaLightReference>,
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub(super) instancing: Option<Instancing>,
+}
+
+/// Copies of a node's mesh.
+#[derive(Debug, Deserialize)]
+pub(super) struct Instancing {
+    /// From TRANSLATION, ROTATION and SCALE to accessors.
+    #[serde(default)]
+    pub(super) attributes: BTreeMap<String, Value>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -74,12 +87,41 @@ pub(super) fn parse(source: Source<'_>, text: &[u8]) -> Result<(Document, Side),
         source: error,
     };
     check_version(source, text).map_err(json_error)??;
-    let mut root: Root = json::deserialize::from_slice(text).map_err(json_error)?;
+    let mut root = parse_root(source, text).map_err(json_error)?;
     let side: Side = json::deserialize::from_slice(text).map_err(json_error)?;
     check_required_extensions(source, &mut root)?;
     check_position_accessors(source, &root)?;
     validate(source, &root)?;
     Ok((Document::from_json_without_validation(root), side))
+}
+
+/// Without the animation channels that move no node (KHR_animation_pointer, or nothing at all),
+/// which the format allows and the `gltf` crate does not.
+fn parse_root(source: Source<'_>, text: &[u8]) -> Result<Root, json::Error> {
+    let error = match json::deserialize::from_slice(text) {
+        Ok(root) => return Ok(root),
+        Err(error) => error,
+    };
+    let mut value: Value = json::deserialize::from_slice(text)?;
+    let animations = value.get_mut("animations").and_then(Value::as_array_mut);
+    let mut left_out = 0;
+    for animation in animations.into_iter().flatten() {
+        if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
+            let all = channels.len();
+            channels.retain(|channel| {
+                let target = channel.get("target");
+                target.is_none_or(|target| target.get("node").is_some())
+            });
+            left_out += all - channels.len();
+        }
+    }
+    // The error that names line and column.
+    if left_out == 0 {
+        return Err(error);
+    }
+    let label = source.label();
+    log::warn!("{label}: {left_out} animation channels that move no node are left out");
+    json::deserialize::from_slice(value.to_string().as_bytes())
 }
 
 /// Older and newer files have other types in the same places, which would make obscure messages.
@@ -114,10 +156,12 @@ fn check_version(source: Source<'_>, text: &[u8]) -> Result<Result<(), SceneErro
 /// Refuses what cannot be rendered rightly, and takes the names of all others out, because the
 /// `gltf` crate would refuse those that it does not know itself.
 fn check_required_extensions(source: Source<'_>, root: &mut Root) -> Result<(), SceneError> {
-    const KNOWN: [&str; 4] = [
-        "KHR_lights_punctual",
+    const KNOWN: [&str; 6] = [
         "EXT_lights_area",
+        "EXT_mesh_gpu_instancing",
+        "KHR_lights_punctual",
         "KHR_mesh_quantization",
+        "KHR_xmp_json_ld",
         "KHR_texture_transform",
     ];
     let known = |name: &str| KNOWN.contains(&name) || name.starts_with("KHR_materials_");

@@ -1,31 +1,46 @@
-//! Meshes: read once in their own space, then placed by each node that shows them.
+//! Meshes: each read once, in its own space.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec2, Vec2, Vec3, Vec4};
+use gltf::accessor::Dimensions;
 use gltf::mesh::Mode;
-use gltf::{Document, Mesh};
+use gltf::{Mesh, Semantic};
 
 use super::accessor::Accessors;
-use super::nodes::PlacedNode;
+use super::materials::Surface;
+use super::morph::{self, Target};
+use super::skin::{self, Influence};
 use super::{SceneError, element};
-use crate::scene::{Material, Primitive};
 
-/// A primitive in the space of its mesh.
+/// Sets of joints and weights that are read: eight joints a vertex.
+const JOINT_SETS: u32 = 2;
+
+/// A primitive in the space of its mesh. Lists of vertices are of the same length, or empty where
+/// that is said.
+#[derive(Debug)]
 pub(super) struct LocalPrimitive {
     pub(super) positions: Vec<Vec3>,
-    /// As in the file, one a position; `None` asks for flat shading, and then no two triangles
-    /// share a vertex.
+    /// As in the file; `None` asks for flat shading.
     pub(super) normals: Option<Vec<Vec3>>,
+    /// Where the material's base texture lies; empty without one.
+    pub(super) uvs: Vec<Vec2>,
     /// Three for each triangle, all in range.
     pub(super) indices: Vec<u32>,
-    material: Option<usize>,
+    pub(super) targets: Vec<Target>,
+    /// JOINTS_0 and WEIGHTS_0, then the next set.
+    pub(super) influences: Vec<Vec<Influence>>,
+    /// Index into the surfaces.
+    pub(super) material: usize,
+    /// The one colour of all vertices, linear, if it is not white.
+    pub(super) color: Option<Vec4>,
 }
 
 /// The triangle primitives of `mesh`; points and lines have no surface and are left out.
 pub(super) fn read(
     accessors: &Accessors<'_>,
     mesh: &Mesh<'_>,
+    surfaces: &[Surface],
 ) -> Result<Vec<LocalPrimitive>, SceneError> {
-    let mut primitives = Vec::new();
+    let mut primitives: Vec<LocalPrimitive> = Vec::new();
     for primitive in mesh.primitives() {
         let name = format!(
             "{}, primitive {}",
@@ -40,50 +55,81 @@ pub(super) fn read(
             log::warn!("{}: {name}: {mode:?} ignored", accessors.source.label());
             continue;
         }
-        let invalid = |reason: String| accessors.source.invalid(name.clone(), reason);
-        let Some(position) = primitive.get(&gltf::Semantic::Positions) else {
-            return Err(invalid("it has no POSITION".into()));
-        };
-        let positions = vectors(accessors, &position, "POSITION", &invalid)?;
-        let normals = match primitive.get(&gltf::Semantic::Normals) {
-            Some(accessor) => Some(vectors(accessors, &accessor, "NORMAL", &invalid)?),
-            None => None,
-        };
-        if let Some(normals) = &normals
-            && normals.len() != positions.len()
+        let read = read_primitive(accessors, &primitive, mode, surfaces, &name)?;
+        if let Some(first) = primitives.first()
+            && first.targets.len() != read.targets.len()
         {
-            return Err(invalid(format!(
-                "it has {} positions and {} normals",
-                positions.len(),
-                normals.len()
-            )));
+            let reason = format!(
+                "it has {} morph targets and the first primitive {}",
+                read.targets.len(),
+                first.targets.len()
+            );
+            return Err(accessors.source.invalid(name, reason));
         }
-        let vertices = match primitive.indices() {
-            Some(accessor) => accessors.read_indices(&accessor)?,
-            None => u32::try_from(positions.len())
-                .map(|count| (0..count).collect())
-                .map_err(|_| invalid("it has more vertices than 32-bit indices reach".into()))?,
-        };
-        if let Some((at, index)) =
-            (vertices.iter().enumerate()).find(|(_, index)| **index as usize >= positions.len())
-        {
-            return Err(invalid(format!(
-                "index {at} names vertex {index} of {}",
-                positions.len()
-            )));
-        }
-        let local = LocalPrimitive {
-            indices: triangles(mode, &vertices),
-            positions,
-            normals,
-            material: primitive.material().index(),
-        };
-        primitives.push(local.unshared_if_flat());
+        primitives.push(read);
     }
     Ok(primitives)
 }
 
-fn vectors(
+fn read_primitive(
+    accessors: &Accessors<'_>,
+    primitive: &gltf::Primitive<'_>,
+    mode: Mode,
+    surfaces: &[Surface],
+    name: &str,
+) -> Result<LocalPrimitive, SceneError> {
+    let invalid = |reason: String| accessors.source.invalid(name, reason);
+    let Some(position) = primitive.get(&Semantic::Positions) else {
+        return Err(invalid("it has no POSITION".into()));
+    };
+    let positions = read_vec3(accessors, &position, "POSITION", &invalid)?;
+    let count = positions.len();
+    let normals = match primitive.get(&Semantic::Normals) {
+        Some(accessor) => Some(read_vec3(accessors, &accessor, "NORMAL", &invalid)?),
+        None => None,
+    };
+    if let Some(normals) = &normals
+        && normals.len() != count
+    {
+        let reason = format!("it has {count} positions and {} normals", normals.len());
+        return Err(invalid(reason));
+    }
+    let vertices = match primitive.indices() {
+        Some(accessor) => accessors.read_indices(&accessor)?,
+        None => u32::try_from(count)
+            .map(|count| (0..count).collect())
+            .map_err(|_| invalid("it has more vertices than 32-bit indices reach".into()))?,
+    };
+    if let Some((at, index)) =
+        (vertices.iter().enumerate()).find(|(_, index)| **index as usize >= count)
+    {
+        return Err(invalid(format!(
+            "index {at} names vertex {index} of {count}"
+        )));
+    }
+    let material = (primitive.material().index())
+        .filter(|&index| index < surfaces.len())
+        .unwrap_or(surfaces.len().saturating_sub(1));
+    Ok(LocalPrimitive {
+        uvs: read_uvs(
+            accessors,
+            primitive,
+            surfaces.get(material),
+            count,
+            &invalid,
+        )?,
+        targets: morph::read(accessors, primitive, count, normals.is_some(), &invalid)?,
+        influences: read_influences(accessors, primitive, count, name)?,
+        color: read_color(accessors, primitive, count, name)?,
+        indices: triangles(mode, &vertices),
+        positions,
+        normals,
+        material,
+    })
+}
+
+/// Finite vectors of three.
+pub(super) fn read_vec3(
     accessors: &Accessors<'_>,
     accessor: &gltf::Accessor<'_>,
     attribute: &str,
@@ -98,6 +144,118 @@ fn vectors(
             vectors[vertex]
         ))),
     }
+}
+
+/// The texture coordinates that the surface's base texture wants, transformed as it says.
+fn read_uvs(
+    accessors: &Accessors<'_>,
+    primitive: &gltf::Primitive<'_>,
+    surface: Option<&Surface>,
+    count: usize,
+    invalid: &dyn Fn(String) -> SceneError,
+) -> Result<Vec<Vec2>, SceneError> {
+    let Some(texture) = surface.and_then(|surface| surface.base_texture.as_ref()) else {
+        return Ok(Vec::new());
+    };
+    let set = texture.tex_coord;
+    let Some(accessor) = primitive.get(&Semantic::TexCoords(set)) else {
+        log::warn!(
+            "{}",
+            invalid(format!(
+                "its texture wants TEXCOORD_{set}, which is missing"
+            ))
+        );
+        return Ok(vec![Vec2::ZERO; count]);
+    };
+    let values = accessors.read_vectors::<2>(&accessor)?;
+    if values.len() != count {
+        let reason = format!(
+            "it has {count} positions and {} texture coordinates",
+            values.len()
+        );
+        return Err(invalid(reason));
+    }
+    let place = |[u, v]: [f32; 2]| {
+        let uv = DVec2::new(f64::from(u), f64::from(v));
+        texture.transform.transform_point2(uv).as_vec2()
+    };
+    let uvs: Vec<Vec2> = values.into_iter().map(place).collect();
+    match uvs.iter().position(|uv| !uv.is_finite()) {
+        None => Ok(uvs),
+        Some(vertex) => Err(invalid(format!(
+            "TEXCOORD_{set} of vertex {vertex} is not finite on its texture"
+        ))),
+    }
+}
+
+fn read_influences(
+    accessors: &Accessors<'_>,
+    primitive: &gltf::Primitive<'_>,
+    count: usize,
+    name: &str,
+) -> Result<Vec<Vec<Influence>>, SceneError> {
+    let invalid = |reason: String| accessors.source.invalid(name, reason);
+    let mut sets = Vec::new();
+    for set in 0..JOINT_SETS {
+        let joints = primitive.get(&Semantic::Joints(set));
+        let weights = primitive.get(&Semantic::Weights(set));
+        match (joints, weights) {
+            (Some(joints), Some(weights)) => {
+                let read = skin::read_influences(accessors, &joints, &weights, count)?;
+                sets.push(read.map_err(invalid)?);
+            }
+            (None, None) => break,
+            _ => {
+                let reason = format!("JOINTS_{set} and WEIGHTS_{set} go together");
+                return Err(invalid(reason));
+            }
+        }
+    }
+    if primitive.get(&Semantic::Joints(JOINT_SETS)).is_some() {
+        let label = accessors.source.label();
+        log::warn!("{label}: {name}: joints of JOINTS_{JOINT_SETS} and beyond ignored");
+    }
+    skin::normalize(&mut sets, count);
+    Ok(sets)
+}
+
+/// The colour of all vertices where they have but one, and it is not white.
+fn read_color(
+    accessors: &Accessors<'_>,
+    primitive: &gltf::Primitive<'_>,
+    count: usize,
+    name: &str,
+) -> Result<Option<Vec4>, SceneError> {
+    let Some(accessor) = primitive.get(&Semantic::Colors(0)) else {
+        return Ok(None);
+    };
+    let colors: Vec<[f32; 4]> = if accessor.dimensions() == Dimensions::Vec3 {
+        let colors = accessors.read_vectors::<3>(&accessor)?;
+        colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
+    } else {
+        accessors.read_vectors::<4>(&accessor)?
+    };
+    let invalid = |reason: String| accessors.source.invalid(name, reason);
+    if colors.len() != count {
+        let reason = format!("it has {count} positions and {} colours", colors.len());
+        return Err(invalid(reason));
+    }
+    let is_finite = |color: &[f32; 4]| color.iter().all(|c| c.is_finite());
+    if let Some(vertex) = colors.iter().position(|color| !is_finite(color)) {
+        return Err(invalid(format!("COLOR_0 of vertex {vertex} is not finite")));
+    }
+    let Some(&first) = colors.first() else {
+        return Ok(None);
+    };
+    if colors.iter().any(|color| *color != first) {
+        log::warn!(
+            "{}: {name}: vertex colours ignored, for they are not all the same",
+            accessors.source.label()
+        );
+        return Ok(None);
+    }
+    let color = Vec4::from_array(first).clamp(Vec4::ZERO, Vec4::ONE);
+    Ok((color != Vec4::ONE).then_some(color))
 }
 
 /// A list of triangles from a list, strip or fan, all wound alike; without those that name a vertex
@@ -125,120 +283,4 @@ fn triangles(mode: Mode, v: &[u32]) -> Vec<u32> {
         .filter(|[a, b, c]| a != b && b != c && c != a)
         .flatten()
         .collect()
-}
-
-impl LocalPrimitive {
-    /// Positions that a triangle uses, repeated as often as it is used.
-    pub(super) fn used_positions(&self) -> impl Iterator<Item = Vec3> + '_ {
-        self.indices
-            .iter()
-            .map(|&index| self.positions[index as usize])
-    }
-
-    /// Flat shading needs a normal a triangle, so triangles cannot share vertices.
-    fn unshared_if_flat(mut self) -> Self {
-        if self.normals.is_none() {
-            self.positions = self.used_positions().collect();
-            // At most as many as there were indices, which are 32-bit themselves.
-            self.indices = (0u32..).take(self.positions.len()).collect();
-        }
-        self
-    }
-
-    /// This primitive as `node` shows it, in scene space.
-    pub(super) fn place(
-        &self,
-        node: &PlacedNode,
-        name: String,
-        origin: DVec3,
-        materials: &[Material],
-    ) -> Primitive {
-        let linear = node.world.matrix3;
-        let world: Vec<DVec3> = (self.positions.iter())
-            .map(|position| node.world.transform_point3(position.as_dvec3()) - origin)
-            .collect();
-        let mut indices = self.indices.clone();
-        // A mirrored triangle would turn its back.
-        let mirrored = linear.determinant() < 0.0;
-        if mirrored {
-            for triangle in indices.chunks_exact_mut(3) {
-                triangle.swap(1, 2);
-            }
-        }
-        let faces = face_normals(&world, &indices);
-        let normals = match &self.normals {
-            None => faces
-                .into_iter()
-                .map(|sum| unit_or_up(sum).as_vec3())
-                .collect(),
-            Some(normals) => {
-                // Cofactors in place of the inverse transpose: they exist for flattened nodes too.
-                let cofactors = DMat3::from_cols(
-                    linear.y_axis.cross(linear.z_axis),
-                    linear.z_axis.cross(linear.x_axis),
-                    linear.x_axis.cross(linear.y_axis),
-                );
-                let sign = if mirrored { -1.0 } else { 1.0 };
-                (normals.iter().zip(faces))
-                    .map(|(normal, face)| {
-                        let normal = unit(sign * (cofactors * normal.as_dvec3()));
-                        normal.unwrap_or_else(|| unit_or_up(face)).as_vec3()
-                    })
-                    .collect()
-            }
-        };
-        Primitive {
-            name,
-            node: Some(node.index),
-            material: (self.material)
-                .filter(|&index| index < materials.len())
-                .unwrap_or(materials.len().saturating_sub(1)),
-            positions: world
-                .into_iter()
-                .map(|position| position.as_vec3())
-                .collect(),
-            normals,
-            indices,
-            uvs: Vec::new(),
-        }
-    }
-}
-
-/// For each vertex the sum of the area vectors of its triangles; not normalised.
-fn face_normals(positions: &[DVec3], indices: &[u32]) -> Vec<DVec3> {
-    let mut sums = vec![DVec3::ZERO; positions.len()];
-    for triangle in indices.chunks_exact(3) {
-        let [a, b, c] = [0, 1, 2].map(|corner| positions[triangle[corner] as usize]);
-        let area = (b - a).cross(c - a);
-        for &vertex in triangle {
-            sums[vertex as usize] += area;
-        }
-    }
-    sums
-}
-
-/// `v` normalised without leaving the range of `f64`.
-fn unit(v: DVec3) -> Option<DVec3> {
-    let largest = v.abs().max_element();
-    (largest > 0.0 && largest.is_finite()).then(|| (v / largest).normalize())
-}
-
-/// A triangle without area has no normal; any will do, as long as it is one.
-fn unit_or_up(v: DVec3) -> DVec3 {
-    unit(v).unwrap_or(DVec3::Y)
-}
-
-/// What messages and reports call primitive `local` of `node`.
-pub(super) fn instance_name(document: &Document, node: &PlacedNode, local: usize) -> String {
-    let mesh = node.mesh.and_then(|index| document.meshes().nth(index));
-    let name = [node.name.as_deref(), mesh.as_ref().and_then(Mesh::name)]
-        .into_iter()
-        .flatten()
-        .find(|name| !name.is_empty());
-    let name = name.map_or_else(|| format!("node {}", node.index), super::shorten);
-    if mesh.is_some_and(|mesh| mesh.primitives().len() > 1) {
-        format!("{name}/{local}")
-    } else {
-        name
-    }
 }

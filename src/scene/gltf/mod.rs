@@ -1,42 +1,66 @@
 //! glTF 2.0 files: from bytes to a [`Scene`].
 //!
 //! The `gltf` crate parses and validates the JSON. Everything that reads bytes (container, buffers,
-//! accessors) is checked here, because a file may declare more than it holds.
+//! accessors, images) is checked here, because a file may declare more than it holds.
 
 mod accessor;
+mod animation;
 mod buffers;
+mod cameras;
 mod container;
 mod document;
+mod instance;
 mod lights;
+mod materials;
 mod mesh;
+mod morph;
 mod nodes;
+mod skin;
+mod textures;
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
-use glam::{DVec3, Vec4};
+use glam::{DAffine3, DVec3};
 use gltf::Document;
 
-use super::camera::SceneCamera;
 use super::error::shorten;
-use super::{AlphaMode, Material, Scene, SceneError};
+use super::{Material, Scene, SceneError, TextureImage};
 use accessor::Accessors;
+use animation::{Animation, Pose};
+use document::Side;
+use instance::Placement;
+use materials::Surface;
 use mesh::LocalPrimitive;
-use nodes::PlacedNode;
+use nodes::{PlacedNode, Tree};
+use skin::Skin;
 
 /// How a file is read.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LoadOptions {
+    /// The moment that [`Scene::load`] shows, seconds after the start of the animation, as in
+    /// [`SceneFile::scene_at`].
+    pub time: f64,
     /// Largest number of vertices, and of indices, that all meshes together may have once every
-    /// node has its own copy: a bound on memory for files that are not trusted.
+    /// node has its own copy: a bound on memory for files that are not trusted. All accessors
+    /// together may have eight times as many elements.
     pub max_vertices: u64,
+    /// Largest number of texels that may be decoded from all images together, four bytes each: a
+    /// bound on memory likewise.
+    pub max_texels: u64,
+    /// Largest width and height of an image, texels.
+    pub max_image_side: u32,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
         Self {
+            time: 0.0,
             max_vertices: 1 << 27,
+            max_texels: 1 << 30,
+            max_image_side: 16_384,
         }
     }
 }
@@ -65,24 +89,38 @@ impl Source<'_> {
     }
 }
 
-/// `` `name` `` after `kind` and `index`, short and on one line.
 fn element(kind: &str, index: usize, name: Option<&str>) -> String {
-    match name {
-        Some(name) if !name.is_empty() => format!("{kind} {index} `{}`", shorten(name)),
-        _ => format!("{kind} {index}"),
-    }
+    super::error::element(kind, index, name.unwrap_or_default())
 }
 
-/// A glTF file in memory, to be seen at any moment of its animation.
+/// A glTF file in memory, read and decoded once, to be seen at any moment of its animation.
+///
+/// All animations of the file play together, from their common start. Where two of them, or two
+/// channels of one, move the same property of the same node, the first in document order counts.
+/// Before its first key and after its last one a property stands still.
+///
+/// [`Scene::rebase_origin`] is chosen from the rest pose, the scene as it is without animation, and
+/// is the same at all times.
 #[derive(Debug)]
 pub struct SceneFile {
-    path: std::path::PathBuf,
-    bytes: Vec<u8>,
-    options: LoadOptions,
+    path: PathBuf,
+    document: Document,
+    side: Side,
+    tree: Tree,
+    animation: Animation,
+    /// By index, those that are shown.
+    meshes: BTreeMap<usize, Vec<LocalPrimitive>>,
+    /// By index, those that are used.
+    skins: BTreeMap<usize, Skin>,
+    /// By node: its copies (EXT_mesh_gpu_instancing), in the space of the node.
+    copies: BTreeMap<usize, Vec<DAffine3>>,
+    materials: Vec<Material>,
+    images: Vec<TextureImage>,
+    rebase_origin: DVec3,
 }
 
 impl SceneFile {
-    /// Reads a file.
+    /// Reads a file, with its buffers and images.
     ///
     /// # Errors
     /// As for [`Scene::load`].
@@ -92,30 +130,211 @@ impl SceneFile {
             file: path.into(),
             source,
         })?;
-        Ok(Self {
-            path: path.into(),
-            bytes,
-            options: options.clone(),
-        })
+        Self::read(path, &bytes, options)
     }
 
-    /// The scene `seconds` after the start of its animation; before the start and after the end it
-    /// stands still.
+    /// As [`open`](Self::open), from the bytes of a file. `path` need not exist: messages name it,
+    /// and external buffers and images are looked for in its folder.
     ///
     /// # Errors
     /// As for [`Scene::load`].
+    pub fn from_slice(
+        path: impl AsRef<Path>,
+        bytes: Vec<u8>,
+        options: &LoadOptions,
+    ) -> Result<Self, SceneError> {
+        Self::read(path.as_ref(), &bytes, options)
+    }
+
+    fn read(path: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Self, SceneError> {
+        let source = Source { path };
+        let parts = container::split(source, bytes)?;
+        let (document, side) = document::parse(source, parts.json)?;
+        let buffers = buffers::load(source, &document, parts.bin)?;
+        let accessors = Accessors {
+            source,
+            buffers: &buffers,
+            limit: options.max_vertices,
+            left: Cell::new(options.max_vertices.saturating_mul(8)),
+        };
+        let tree = Tree::read(source, &document, &side)?;
+        let animation = Animation::read(&accessors, &document, &tree)?;
+        let rest = Pose::default();
+        let placed = tree.place(source, &document, &rest)?;
+        let surfaces = materials::read(&document);
+        let copies = instance::copies(&accessors, &document, &side, &placed)?;
+        let mut meshes = read_meshes(&accessors, &document, &placed, &copies, &surfaces)?;
+        let skins = read_skins(&accessors, &document, &placed, &meshes)?;
+        let (materials, images) =
+            materials::finish(source, &document, &buffers, options, surfaces, &mut meshes)?;
+        drop(buffers);
+        let mut file = Self {
+            path: path.into(),
+            document,
+            side,
+            tree,
+            animation,
+            meshes,
+            skins,
+            copies,
+            materials,
+            images,
+            rebase_origin: DVec3::ZERO,
+        };
+        file.rebase_origin = file.rest_origin(&placed)?;
+        Ok(file)
+    }
+
+    /// True if anything in the file moves.
+    pub fn is_animated(&self) -> bool {
+        !self.animation.is_empty()
+    }
+
+    /// Seconds from the start of the animation to its last key; 0 if nothing moves.
+    pub fn duration(&self) -> f64 {
+        self.animation.duration()
+    }
+
+    /// The scene `seconds` after the start of its animation; before the start and after the end it
+    /// stands still. NaN counts as 0.
+    ///
+    /// # Errors
+    /// A [`SceneError`] that names the file and the element: what [`Scene::finish`] refuses, and
+    /// transforms that leave the range of numbers at that moment.
     pub fn scene_at(&self, seconds: f64) -> Result<Scene, SceneError> {
-        let _ = seconds;
-        load_slice(&self.path, &self.bytes, &self.options)
+        let mut scene = self.without_images(seconds)?;
+        scene.images.clone_from(&self.images);
+        scene.finish()?;
+        Ok(scene)
+    }
+
+    /// As [`scene_at`](Self::scene_at), for one moment only.
+    fn into_scene_at(self, seconds: f64) -> Result<Scene, SceneError> {
+        let mut scene = self.without_images(seconds)?;
+        scene.images = self.images;
+        scene.finish()?;
+        Ok(scene)
+    }
+
+    fn source(&self) -> Source<'_> {
+        Source { path: &self.path }
+    }
+
+    /// All of the scene but its images.
+    fn without_images(&self, seconds: f64) -> Result<Scene, SceneError> {
+        let (source, document) = (self.source(), &self.document);
+        let pose = self.animation.pose(&self.tree, seconds);
+        let placed = self.tree.place(source, document, &pose)?;
+        let name = self.path.file_stem();
+        let mut scene = Scene {
+            name: name.map_or_else(String::new, |stem| stem.to_string_lossy().into()),
+            source: Some(self.path.clone()),
+            rebase_origin: self.rebase_origin,
+            materials: self.materials.clone(),
+            ..Scene::default()
+        };
+        self.each_instance(&placed, &pose, self.rebase_origin, |shown| {
+            let mut name = instance::name(document, shown.node, shown.local);
+            if let Some(copy) = shown.copy {
+                name.push_str(&format!("[{copy}]"));
+            }
+            let (placement, weights) = (shown.placement, shown.weights);
+            let primitive = (shown.primitive).place(shown.node.index, name, placement, weights);
+            scene.primitives.push(primitive);
+        })?;
+        cameras::add(&mut scene, source, document, &placed)?;
+        lights::add(&mut scene, source, document, &self.side, &placed)?;
+        Ok(scene)
+    }
+
+    /// Every primitive as often as a node shows it, in document order.
+    fn each_instance(
+        &self,
+        placed: &[PlacedNode],
+        pose: &Pose,
+        origin: DVec3,
+        mut show: impl FnMut(&Shown<'_>),
+    ) -> Result<(), SceneError> {
+        let source = self.source();
+        let mut joints = BTreeMap::new();
+        if !self.skins.is_empty() {
+            let worlds = self.tree.worlds(pose);
+            for (&index, skin) in &self.skins {
+                let matrices = skin.matrices(source, &worlds, origin)?;
+                joints.insert(index, Placement::Skinned(matrices));
+            }
+        }
+        for node in placed {
+            let Some(primitives) = node.mesh.and_then(|mesh| self.meshes.get(&mesh)) else {
+                continue;
+            };
+            let targets = primitives.first().map_or(0, |first| first.targets.len());
+            let weights = morph::weights(source, &self.document, node, pose, targets)?;
+            let joints = node.skin.and_then(|skin| joints.get(&skin));
+            let copies = self.copies.get(&node.index);
+            for copy in 0..copies.map_or(1, Vec::len) {
+                let mut world = node.world;
+                world.translation -= origin;
+                if let Some(local) = copies.and_then(|copies| copies.get(copy)) {
+                    world *= *local;
+                }
+                let rigid = Placement::Rigid(world);
+                for (local, primitive) in primitives.iter().enumerate() {
+                    let joints = joints.filter(|_| !primitive.influences.is_empty());
+                    // A skin says where the mesh is, wherever its node is: a copy would be the same.
+                    if joints.is_some() && copy > 0 {
+                        continue;
+                    }
+                    show(&Shown {
+                        node,
+                        primitive,
+                        local,
+                        copy: copies.map(|_| copy),
+                        placement: joints.unwrap_or(&rigid),
+                        weights: &weights,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The middle of all triangles of the rest pose in world space, rounded to a power of two of
+    /// about the scene's size: a scene near the origin stays where it is, and rounding keeps round
+    /// coordinates round.
+    fn rest_origin(&self, placed: &[PlacedNode]) -> Result<DVec3, SceneError> {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        self.each_instance(placed, &Pose::default(), DVec3::ZERO, |shown| {
+            let bounds = shown.primitive.bounds(shown.placement, shown.weights);
+            low = low.min(bounds.0);
+            high = high.max(bounds.1);
+        })?;
+        let size = (high - low).length();
+        let quantum = size.log2().ceil().exp2();
+        let origin = (0.5 * (low + high) / quantum).round() * quantum;
+        Ok(if size > 0.0 && origin.is_finite() {
+            // Adding 0 turns -0 into 0.
+            origin + 0.0
+        } else {
+            DVec3::ZERO
+        })
     }
 }
 
+/// A primitive as one node shows it.
+struct Shown<'a> {
+    node: &'a PlacedNode,
+    primitive: &'a LocalPrimitive,
+    /// Number of the primitive in its mesh.
+    local: usize,
+    /// Number of the node's copy, if it has copies.
+    copy: Option<usize>,
+    placement: &'a Placement,
+    weights: &'a [f64],
+}
+
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
-        file: path.into(),
-        source,
-    })?;
-    load_slice(path, &bytes, options)
+    SceneFile::open(path, options)?.into_scene_at(options.time)
 }
 
 pub(super) fn load_slice(
@@ -123,42 +342,7 @@ pub(super) fn load_slice(
     bytes: &[u8],
     options: &LoadOptions,
 ) -> Result<Scene, SceneError> {
-    let source = Source { path };
-    let parts = container::split(source, bytes)?;
-    let (document, side) = document::parse(source, parts.json)?;
-    let buffers = buffers::load(source, &document, parts.bin)?;
-    let accessors = Accessors {
-        source,
-        buffers: &buffers,
-        limit: options.max_vertices,
-    };
-    let placed = nodes::place(source, &document, &side)?;
-    let meshes = read_meshes(&accessors, &document, &placed, options.max_vertices)?;
-
-    let mut scene = Scene {
-        name: path
-            .file_stem()
-            .map_or_else(String::new, |stem| stem.to_string_lossy().into()),
-        source: Some(path.into()),
-        rebase_origin: rebase_origin(&placed, &meshes),
-        ..Scene::default()
-    };
-    add_materials(&mut scene, &document);
-    for node in &placed {
-        for (local, primitive) in meshes.get(&node.mesh).into_iter().flatten().enumerate() {
-            let name = mesh::instance_name(&document, node, local);
-            scene.primitives.push(primitive.place(
-                node,
-                name,
-                scene.rebase_origin,
-                &scene.materials,
-            ));
-        }
-    }
-    add_cameras(&mut scene, source, &document, &placed)?;
-    lights::add(&mut scene, source, &document, &side, &placed)?;
-    scene.finish()?;
-    Ok(scene)
+    SceneFile::read(path, bytes, options)?.into_scene_at(options.time)
 }
 
 /// The triangle primitives of every mesh that a node shows, each read once.
@@ -166,128 +350,76 @@ fn read_meshes(
     accessors: &Accessors<'_>,
     document: &Document,
     placed: &[PlacedNode],
-    limit: u64,
-) -> Result<BTreeMap<Option<usize>, Vec<LocalPrimitive>>, SceneError> {
+    copies: &BTreeMap<usize, Vec<DAffine3>>,
+    surfaces: &[Surface],
+) -> Result<BTreeMap<usize, Vec<LocalPrimitive>>, SceneError> {
     let mut meshes = BTreeMap::new();
-    let (mut vertices, mut indices) = (0u64, 0u64);
+    let (mut vertices, mut indices, mut displacements) = (0u64, 0u64, 0u64);
     for node in placed {
         let Some(mesh) = node.mesh.and_then(|index| document.meshes().nth(index)) else {
             continue;
         };
-        let primitives = match meshes.entry(node.mesh) {
+        let primitives: &Vec<LocalPrimitive> = match meshes.entry(mesh.index()) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::btree_map::Entry::Vacant(entry) => {
-                entry.insert(mesh::read(accessors, &mesh)?)
+                entry.insert(mesh::read(accessors, &mesh, surfaces)?)
             }
         };
+        let times = copies
+            .get(&node.index)
+            .map_or(1, |copies| copies.len() as u64);
         for primitive in primitives {
-            vertices += primitive.positions.len() as u64;
-            indices += primitive.indices.len() as u64;
+            let count = primitive.positions.len() as u64;
+            // An empty copy costs memory too.
+            vertices = vertices.saturating_add(times.saturating_mul(count.max(1)));
+            indices = indices.saturating_add(times * primitive.indices.len() as u64);
+            let targets = primitive.targets.len() as u64;
+            displacements = displacements.saturating_add(times * targets * count.max(1) / 8);
         }
-        if vertices.max(indices) > limit {
+        if vertices.max(indices).max(displacements) > accessors.limit {
             return Err(SceneError::TooLarge {
                 file: accessors.source.label(),
                 element: element("mesh", mesh.index(), mesh.name()),
-                limit,
+                limit: accessors.limit,
             });
         }
     }
     Ok(meshes)
 }
 
-/// The middle of all triangles in world space, rounded to a power of two of about the scene's size:
-/// a scene near the origin stays where it is, and rounding keeps round coordinates round.
-fn rebase_origin(
+/// The skins of all nodes that show a mesh, checked against the meshes that follow them.
+fn read_skins(
+    accessors: &Accessors<'_>,
+    document: &Document,
     placed: &[PlacedNode],
-    meshes: &BTreeMap<Option<usize>, Vec<LocalPrimitive>>,
-) -> DVec3 {
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    meshes: &BTreeMap<usize, Vec<LocalPrimitive>>,
+) -> Result<BTreeMap<usize, Skin>, SceneError> {
+    let source = accessors.source;
+    let mut skins = BTreeMap::new();
+    let mut checked = BTreeSet::new();
     for node in placed {
-        for primitive in meshes.get(&node.mesh).into_iter().flatten() {
-            for position in primitive.used_positions() {
-                let world = node.world.transform_point3(position.as_dvec3());
-                low = low.min(world);
-                high = high.max(world);
+        let (Some(mesh), Some(index)) = (node.mesh, node.skin) else {
+            continue;
+        };
+        if let std::collections::btree_map::Entry::Vacant(entry) = skins.entry(index) {
+            entry.insert(Skin::read(accessors, document, index)?);
+        }
+        let (Some(skin), Some(primitives)) = (skins.get(&index), meshes.get(&mesh)) else {
+            continue;
+        };
+        if !checked.insert((mesh, index)) {
+            continue;
+        }
+        for (number, primitive) in primitives.iter().enumerate() {
+            let name = || format!("{}, primitive {number}", element("mesh", mesh, None));
+            if primitive.influences.is_empty() {
+                let label = source.label();
+                log::warn!("{label}: {}: no joints, so its skin is ignored", name());
+            }
+            if let Some(fault) = skin.fault(&primitive.influences) {
+                return Err(source.invalid(name(), fault));
             }
         }
     }
-    let size = (high - low).length();
-    let quantum = size.log2().ceil().exp2();
-    let origin = (0.5 * (low + high) / quantum).round() * quantum;
-    if size > 0.0 && origin.is_finite() {
-        // Adding 0 turns -0 into 0.
-        origin + 0.0
-    } else {
-        DVec3::ZERO
-    }
-}
-
-/// All materials, and last the one for primitives that name none.
-fn add_materials(scene: &mut Scene, document: &Document) {
-    scene.materials.extend(document.materials().map(|material| {
-        let [r, g, b, a] = material.pbr_metallic_roughness().base_color_factor();
-        Material {
-            name: material.name().unwrap_or_default().into(),
-            base_color: Vec4::new(r, g, b, a).clamp(Vec4::ZERO, Vec4::ONE),
-            double_sided: material.double_sided(),
-            alpha_mode: match material.alpha_mode() {
-                gltf::material::AlphaMode::Opaque => AlphaMode::Opaque,
-                gltf::material::AlphaMode::Blend => AlphaMode::Blend,
-                gltf::material::AlphaMode::Mask => AlphaMode::Mask {
-                    cutoff: material.alpha_cutoff().unwrap_or(0.5),
-                },
-            },
-            ..Material::default()
-        }
-    }));
-    scene.materials.push(Material::default());
-}
-
-fn add_cameras(
-    scene: &mut Scene,
-    source: Source<'_>,
-    document: &Document,
-    placed: &[PlacedNode],
-) -> Result<(), SceneError> {
-    let json = &document.as_json().cameras;
-    let with_camera = placed
-        .iter()
-        .filter_map(|node| Some((node, json.get(node.camera?)?)));
-    for (index, (node, camera)) in with_camera.enumerate() {
-        let name = [node.name.as_deref(), camera.name.as_deref()]
-            .into_iter()
-            .flatten()
-            .find(|name| !name.is_empty())
-            .map_or_else(|| format!("camera {index}"), Into::into);
-        let is_perspective = matches!(
-            camera.type_,
-            gltf::json::validation::Checked::Valid(gltf::json::camera::Type::Perspective)
-        );
-        if !is_perspective {
-            scene.orthographic_cameras.push((index, name));
-            continue;
-        }
-        let element = || element("camera", index, Some(&name));
-        let Some(lens) = &camera.perspective else {
-            return Err(source.invalid(element(), "its `perspective` is missing"));
-        };
-        let frame = nodes::frame(node.world.matrix3, nodes::Keep::Y);
-        let camera = SceneCamera {
-            node: Some(node.index),
-            index,
-            position: (node.world.translation - scene.rebase_origin).as_vec3(),
-            right: frame.x_axis.as_vec3(),
-            up: frame.y_axis.as_vec3(),
-            forward: -frame.z_axis.as_vec3(),
-            yfov: lens.yfov,
-            znear: lens.znear,
-            zfar: lens.zfar,
-            name: name.clone(),
-        };
-        if let Some(fault) = camera.fault() {
-            return Err(source.invalid(element(), fault));
-        }
-        scene.cameras.push(camera);
-    }
-    Ok(())
+    Ok(skins)
 }

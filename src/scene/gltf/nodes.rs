@@ -3,6 +3,7 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use gltf::Document;
 
+use super::animation::Pose;
 use super::document::{Side, SideNode};
 use super::{SceneError, Source, element};
 
@@ -11,100 +12,182 @@ pub(super) struct PlacedNode {
     pub(super) index: usize,
     pub(super) name: Option<String>,
     pub(super) mesh: Option<usize>,
+    pub(super) skin: Option<usize>,
     pub(super) camera: Option<usize>,
     /// From the node's space to world space.
     pub(super) world: DAffine3,
 }
 
-/// The nodes of the default scene, in document order. Without a default it is the first scene, and
-/// in a file without scenes all nodes.
-pub(super) fn place(
-    source: Source<'_>,
-    document: &Document,
-    side: &Side,
-) -> Result<Vec<PlacedNode>, SceneError> {
-    let nodes = &document.as_json().nodes;
-    let mut open: Vec<(usize, DAffine3)> = roots(document)
-        .into_iter()
-        .map(|root| (root, DAffine3::IDENTITY))
-        .collect();
-    let mut placed = Vec::new();
-    let mut seen = vec![false; nodes.len()];
-    while let Some((index, parent)) = open.pop() {
-        let (Some(json), Some(seen)) = (nodes.get(index), seen.get_mut(index)) else {
-            continue;
-        };
-        let element = || element("node", index, json.name.as_deref());
-        // Also what ends the walk of a tree that bites its tail.
-        if std::mem::replace(seen, true) {
-            let reason = "it is reached twice: nodes must form a tree";
-            return Err(source.invalid(element(), reason));
-        }
-        let local = match side.nodes.get(index) {
-            Some(node) => local_transform(node).map_err(|why| source.invalid(element(), why))?,
-            None => DAffine3::IDENTITY,
-        };
-        let world = parent * local;
-        if !world.is_finite() {
-            return Err(source.invalid(element(), "its transform is not finite"));
-        }
-        let children = json.children.iter().flatten();
-        open.extend(children.map(|child| (child.value(), world)));
-        if json.skin.is_some() && json.mesh.is_some() {
-            log::warn!("{}: {}: skin ignored", source.label(), element());
-        }
-        placed.push(PlacedNode {
-            index,
-            name: json.name.clone(),
-            mesh: json.mesh.map(|mesh| mesh.value()),
-            camera: json.camera.map(|camera| camera.value()),
-            world,
-        });
-    }
-    placed.sort_by_key(|node| node.index);
-    Ok(placed)
+/// What a node does to its children, in parts that can be animated.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parts {
+    pub(super) translation: DVec3,
+    /// Of length 1.
+    pub(super) rotation: DQuat,
+    pub(super) scale: DVec3,
 }
 
-fn roots(document: &Document) -> Vec<usize> {
-    let scene = document
-        .default_scene()
-        .or_else(|| document.scenes().next());
-    if let Some(scene) = scene {
-        return scene.nodes().map(|node| node.index()).collect();
-    }
-    let nodes = &document.as_json().nodes;
-    let mut is_child = vec![false; nodes.len()];
-    for child in nodes.iter().flat_map(|node| node.children.iter().flatten()) {
-        if let Some(is_child) = is_child.get_mut(child.value()) {
-            *is_child = true;
-        }
-    }
-    (0..nodes.len()).filter(|&index| !is_child[index]).collect()
+#[derive(Clone, Copy, Debug)]
+enum Local {
+    Matrix(DAffine3),
+    Parts(Parts),
 }
 
-fn local_transform(node: &SideNode) -> Result<DAffine3, &'static str> {
+/// The transforms of all nodes as the file has them, and who is whose parent.
+#[derive(Debug)]
+pub(super) struct Tree {
+    locals: Vec<Local>,
+    parents: Vec<Option<usize>>,
+}
+
+impl Tree {
+    pub(super) fn read(
+        source: Source<'_>,
+        document: &Document,
+        side: &Side,
+    ) -> Result<Self, SceneError> {
+        let nodes = &document.as_json().nodes;
+        let mut tree = Self {
+            locals: Vec::with_capacity(nodes.len()),
+            parents: vec![None; nodes.len()],
+        };
+        let unmoved = SideNode::default();
+        for (index, node) in nodes.iter().enumerate() {
+            let local = local_transform(side.nodes.get(index).unwrap_or(&unmoved));
+            let local = local
+                .map_err(|why| source.invalid(element("node", index, node.name.as_deref()), why))?;
+            tree.locals.push(local);
+            for child in node.children.iter().flatten() {
+                if let Some(parent) = tree.parents.get_mut(child.value()) {
+                    *parent = Some(index);
+                }
+            }
+        }
+        Ok(tree)
+    }
+
+    /// The parts of a node that is not given by a matrix.
+    pub(super) fn parts(&self, node: usize) -> Option<Parts> {
+        match self.locals.get(node)? {
+            Local::Parts(parts) => Some(*parts),
+            Local::Matrix(_) => None,
+        }
+    }
+
+    fn local(&self, node: usize, pose: &Pose) -> DAffine3 {
+        let parts = match (pose.parts.get(&node), self.locals.get(node)) {
+            (Some(parts), _) | (None, Some(Local::Parts(parts))) => parts,
+            (None, Some(Local::Matrix(matrix))) => return *matrix,
+            (None, None) => return DAffine3::IDENTITY,
+        };
+        DAffine3::from_scale_rotation_translation(parts.scale, parts.rotation, parts.translation)
+    }
+
+    /// For each node, shown or not, from its space to world space; `None` for its own ancestors.
+    pub(super) fn worlds(&self, pose: &Pose) -> Vec<Option<DAffine3>> {
+        let mut worlds = vec![None; self.parents.len()];
+        let mut seen = vec![false; self.parents.len()];
+        let mut chain = Vec::new();
+        for node in 0..self.parents.len() {
+            let mut at = Some(node);
+            while let Some(index) = at.filter(|&index| !seen[index]) {
+                seen[index] = true;
+                chain.push(index);
+                at = self.parents[index];
+            }
+            // A node that was seen and has no transform yet is in this chain, or hangs on a loop.
+            let mut world = at.map_or(Some(DAffine3::IDENTITY), |index| worlds[index]);
+            while let Some(index) = chain.pop() {
+                world = world.map(|world| world * self.local(index, pose));
+                worlds[index] = world;
+            }
+        }
+        worlds
+    }
+
+    /// The nodes of the default scene, in document order. Without a default it is the first scene,
+    /// and in a file without scenes all nodes.
+    pub(super) fn place(
+        &self,
+        source: Source<'_>,
+        document: &Document,
+        pose: &Pose,
+    ) -> Result<Vec<PlacedNode>, SceneError> {
+        let nodes = &document.as_json().nodes;
+        let mut open: Vec<(usize, DAffine3)> = self
+            .roots(document)
+            .into_iter()
+            .map(|root| (root, DAffine3::IDENTITY))
+            .collect();
+        let mut placed = Vec::new();
+        let mut seen = vec![false; nodes.len()];
+        while let Some((index, parent)) = open.pop() {
+            let (Some(json), Some(seen)) = (nodes.get(index), seen.get_mut(index)) else {
+                continue;
+            };
+            let element = || element("node", index, json.name.as_deref());
+            // Also what ends the walk of a tree that bites its tail.
+            if std::mem::replace(seen, true) {
+                let reason = "it is reached twice: nodes must form a tree";
+                return Err(source.invalid(element(), reason));
+            }
+            let world = parent * self.local(index, pose);
+            if !world.is_finite() {
+                return Err(source.invalid(element(), "its transform is not finite"));
+            }
+            let children = json.children.iter().flatten();
+            open.extend(children.map(|child| (child.value(), world)));
+            placed.push(PlacedNode {
+                index,
+                name: json.name.clone(),
+                mesh: json.mesh.map(|mesh| mesh.value()),
+                skin: json.skin.map(|skin| skin.value()),
+                camera: json.camera.map(|camera| camera.value()),
+                world,
+            });
+        }
+        placed.sort_by_key(|node| node.index);
+        Ok(placed)
+    }
+
+    fn roots(&self, document: &Document) -> Vec<usize> {
+        let scene = document
+            .default_scene()
+            .or_else(|| document.scenes().next());
+        if let Some(scene) = scene {
+            return scene.nodes().map(|node| node.index()).collect();
+        }
+        let is_root = |&node: &usize| self.parents.get(node) == Some(&None);
+        (0..self.parents.len()).filter(is_root).collect()
+    }
+}
+
+fn local_transform(node: &SideNode) -> Result<Local, &'static str> {
     if let Some(m) = node.matrix {
         if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] {
             return Err("the last row of its matrix is not 0 0 0 1");
         }
-        return Ok(DAffine3::from_cols_array_2d(&[
+        return Ok(Local::Matrix(DAffine3::from_cols_array_2d(&[
             [m[0], m[1], m[2]],
             [m[4], m[5], m[6]],
             [m[8], m[9], m[10]],
             [m[12], m[13], m[14]],
-        ]));
+        ])));
     }
-    let rotation = DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    let rotation = unit_rotation(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    Ok(Local::Parts(Parts {
+        translation: DVec3::from_array(node.translation.unwrap_or([0.0; 3])),
+        rotation: rotation.ok_or("its rotation is not a unit quaternion")?,
+        scale: DVec3::from_array(node.scale.unwrap_or([1.0; 3])),
+    }))
+}
+
+/// A quaternion (x, y, z, w) made exactly unit. Rounded ones are common; one that is far from unit
+/// is a mistake.
+pub(super) fn unit_rotation(xyzw: [f64; 4]) -> Option<DQuat> {
+    let rotation = DQuat::from_array(xyzw);
     let length = rotation.length();
-    // Rounded quaternions are common; one that is far from unit is a mistake.
-    if !(0.9..=1.1).contains(&length) {
-        return Err("its rotation is not a unit quaternion");
-    }
-    Ok(DAffine3::from_scale_rotation_translation(
-        DVec3::from_array(node.scale.unwrap_or([1.0; 3])),
-        rotation / length,
-        DVec3::from_array(node.translation.unwrap_or([0.0; 3])),
-    ))
+    (0.9..=1.1).contains(&length).then(|| rotation / length)
 }
 
 /// Largest absolute component of the world scale: the length of the longest axis.

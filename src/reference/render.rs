@@ -260,7 +260,9 @@ impl<'a> Band<'a> {
             let pooled = partial.map(|at| {
                 let (mut sum, mut count) = (tallies[at].variance(), 1.0);
                 for other in self.around(at).filter(|&other| is_partial(other)) {
-                    sum += tallies[other].variance();
+                    // As it would be with as many samples as here, by the law of independent ones.
+                    let ratio = f64::from(tallies[other].cast) / f64::from(tallies[at].cast);
+                    sum += tallies[other].variance() * ratio;
                     count += 1.0;
                 }
                 (at, sum / count)

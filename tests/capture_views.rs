@@ -5,9 +5,10 @@ mod support;
 
 use antumbra::capture::{CapturedFrame, FrameRenderer, FrameRequest};
 use antumbra::light::{AreaLight, LightShape};
-use antumbra::scene::{Aabb, Material, Primitive, Scene, SceneCamera, SceneLight};
+use antumbra::scene::{Aabb, LoadOptions, Material, Primitive, Scene, SceneCamera, SceneLight};
 use antumbra::shadow::Technique;
 use glam::{UVec2, Vec3};
+use std::path::Path;
 
 const SIZE: u32 = 96;
 
@@ -159,5 +160,39 @@ fn a_picture_of_nothing_draws_no_map() {
         map.unwrap().to_string().contains(" 1x1,"),
         "{}",
         map.unwrap()
+    );
+}
+
+#[test]
+fn a_scene_without_triangles_is_all_lit() {
+    let mut scene = room();
+    scene.primitives.clear();
+    let frame = render(&scene, &camera(Vec3::new(-1.9, 0.0, 0.0), Vec3::X));
+    assert!(frame.lights[0].visibility.iter().all(|v| *v == 1.0));
+}
+
+/// The same scene 100 km from the origin and at it: equal but for where rounding moves an edge.
+#[test]
+fn a_scene_far_away_looks_as_it_does_at_home() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/far_away.gltf");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let home = text.replace("[60000.0, 0.0, -80000.0]", "[0.0, 0.0, 0.0]");
+    assert_ne!(text, home, "the scene stands far away");
+    let options = LoadOptions::default();
+    let scenes =
+        [text, home].map(|text| Scene::load_slice(&path, text.as_bytes(), &options).unwrap());
+    assert!(scenes[0].rebase_origin.length() > 90_000.0);
+    assert!(scenes[1].rebase_origin.length() < 100.0);
+    let [far, near] = scenes.each_ref().map(|scene| {
+        let camera = scene.select_camera(None).unwrap();
+        render(scene, &camera).lights[0].visibility.clone()
+    });
+    let differ = far.iter().zip(&near).filter(|(a, b)| a != b).count();
+    let dark = near.iter().filter(|v| **v == 0.0).count();
+    assert!(dark > 200, "{dark}");
+    assert!(
+        differ * 1000 <= near.len() * 2,
+        "{differ} of {} pixels",
+        near.len()
     );
 }

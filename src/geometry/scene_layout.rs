@@ -43,6 +43,7 @@ pub(super) struct Layout {
     pub draws: Vec<Draw>,
     /// Triangles that no ray meets and no pixel shows: without area, or cut out as a whole.
     pub degenerate: usize,
+    scene_radius: f32,
 }
 
 /// Chunks that the triangles of a scene are cut into, at least: few enough to test each against
@@ -50,6 +51,8 @@ pub(super) struct Layout {
 const CHUNKS: usize = 512;
 /// Fewest triangles of a chunk.
 const LEAST_IN_CHUNK: usize = 4;
+/// Part of the scene's size from which on a chunk is looked at for being mostly empty.
+const LARGE: f32 = 0.1;
 
 /// How a primitive uses its texture: the order of primitives on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -65,7 +68,10 @@ enum Kind {
 impl Layout {
     /// Lays out a scene.
     pub fn new(scene: &Scene) -> Self {
-        let mut layout = Self::default();
+        let mut layout = Self {
+            scene_radius: scene.bounds.radius(),
+            ..Self::default()
+        };
         let rows = layout.add_textures(scene);
         layout.materials = materials(scene, &rows);
         let chunk = (scene.triangle_count() / CHUNKS).max(LEAST_IN_CHUNK);
@@ -126,43 +132,83 @@ impl Layout {
         if triangles.len() > chunk {
             sort_by_place(&mut triangles, &primitive.positions);
         }
-        for triangles in triangles.chunks(chunk) {
-            let first_index = self.indices.len();
-            let mut bounds = Aabb::EMPTY;
-            for corners in triangles {
-                let points = corners.map(|corner| primitive.positions[corner]);
-                let Some(normal) = unit_normal(points) else {
-                    continue;
-                };
-                points.iter().for_each(|point| bounds.insert(*point));
-                let triangle = (self.indices.len() / 3) as u32;
-                let indices = self.own_first_vertex(first_vertex, *corners, points[0], triangle);
-                if self.mask_uvs.len() < self.vertices.len() && kind == Kind::Masked {
-                    self.mask_uvs.push(uv(corners[0]));
-                }
-                self.indices.extend(indices);
-                for (corner, point) in corners.iter().zip(points) {
-                    let normal = pack_corner_normal(primitive.normals[*corner]);
-                    self.triangles.push(point.extend(normal).to_array());
-                }
-                let material = match kind {
-                    Kind::Masked => -1.0 - primitive.material as f32,
-                    Kind::Textured | Kind::Plain => primitive.material as f32,
-                };
-                self.triangles.push(normal.extend(material).to_array());
-                if kind != Kind::Plain {
-                    let [[au, av], [bu, bv], [cu, cv]] = corners.map(uv);
-                    self.triangle_uvs.push([au, av, bu, bv]);
-                    self.triangle_uvs.push([cu, cv, 0.0, 0.0]);
-                }
-            }
-            self.draws.push(Draw {
-                first_index: first_index as u32,
-                index_count: (self.indices.len() - first_index) as u32,
-                bounds,
-                mask: (kind == Kind::Masked).then_some(primitive.material as u32),
-            });
+        let mut rest = triangles.as_slice();
+        while !rest.is_empty() {
+            let count = self.chunk_length(rest, &primitive.positions, chunk);
+            let (now, later) = rest.split_at(count);
+            self.add_chunk(primitive, kind, first_vertex, now);
+            rest = later;
         }
+    }
+
+    /// How many of the triangles make the next chunk: at most `most`, and fewer where a box around
+    /// them would be mostly empty, as one around two walls of a room.
+    fn chunk_length(&self, triangles: &[[usize; 3]], positions: &[Vec3], most: usize) -> usize {
+        let box_of = |corners: &[usize; 3]| {
+            let mut bounds = Aabb::EMPTY;
+            corners.iter().for_each(|c| bounds.insert(positions[*c]));
+            bounds
+        };
+        let mut bounds = Aabb::EMPTY;
+        for (count, corners) in triangles.iter().take(most).enumerate() {
+            let next = box_of(corners);
+            let mut both = bounds;
+            both.insert(next.min);
+            both.insert(next.max);
+            let is_large = both.radius() > LARGE * self.scene_radius;
+            let filled = half_area(&bounds) + half_area(&next);
+            if count > 0 && is_large && half_area(&both) > 1.5 * filled {
+                return count;
+            }
+            bounds = both;
+        }
+        most.min(triangles.len())
+    }
+
+    /// Adds neighbouring triangles, which one box bounds.
+    fn add_chunk(
+        &mut self,
+        primitive: &Primitive,
+        kind: Kind,
+        first_vertex: usize,
+        triangles: &[[usize; 3]],
+    ) {
+        let uv = |corner: usize| primitive.uvs.get(corner).map_or([0.0; 2], Vec2::to_array);
+        let first_index = self.indices.len();
+        let mut bounds = Aabb::EMPTY;
+        for corners in triangles {
+            let points = corners.map(|corner| primitive.positions[corner]);
+            let Some(normal) = unit_normal(points) else {
+                continue;
+            };
+            points.iter().for_each(|point| bounds.insert(*point));
+            let triangle = (self.indices.len() / 3) as u32;
+            let indices = self.own_first_vertex(first_vertex, *corners, points[0], triangle);
+            if self.mask_uvs.len() < self.vertices.len() && kind == Kind::Masked {
+                self.mask_uvs.push(uv(corners[0]));
+            }
+            self.indices.extend(indices);
+            for (corner, point) in corners.iter().zip(points) {
+                let normal = pack_corner_normal(primitive.normals[*corner]);
+                self.triangles.push(point.extend(normal).to_array());
+            }
+            let material = match kind {
+                Kind::Masked => -1.0 - primitive.material as f32,
+                Kind::Textured | Kind::Plain => primitive.material as f32,
+            };
+            self.triangles.push(normal.extend(material).to_array());
+            if kind != Kind::Plain {
+                let [[au, av], [bu, bv], [cu, cv]] = corners.map(uv);
+                self.triangle_uvs.push([au, av, bu, bv]);
+                self.triangle_uvs.push([cu, cv, 0.0, 0.0]);
+            }
+        }
+        self.draws.push(Draw {
+            first_index: first_index as u32,
+            index_count: (self.indices.len() - first_index) as u32,
+            bounds,
+            mask: (kind == Kind::Masked).then_some(primitive.material as u32),
+        });
     }
 
     /// Indices of a triangle, turned so that its first vertex is no other triangle's first vertex:
@@ -193,6 +239,15 @@ impl Layout {
         ]
         .map(|v| v as u32)
     }
+}
+
+/// Half the surface of a box; 0 without points.
+fn half_area(bounds: &Aabb) -> f32 {
+    if bounds.is_empty() {
+        return 0.0;
+    }
+    let size = bounds.max - bounds.min;
+    size.x * size.y + size.y * size.z + size.z * size.x
 }
 
 /// How a primitive uses its texture; `None` where alpha cuts out all of it.

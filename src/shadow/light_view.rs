@@ -39,7 +39,8 @@ const WIDEST: f64 = 65.0 * std::f64::consts::PI / 180.0;
 /// ones out.
 const MARGIN: f64 = 2.0 / 1024.0;
 
-/// Finds the views of a light that look at every one of `receivers`: points whose convex hulls,
+/// Finds the views of a light that look at every one of `receivers` (but behind a disk or rectangle,
+/// where it gives no light): points whose convex hulls,
 /// eight corners of a box or fewer of a clipped one, hold all surfaces that need its visibility.
 /// One fitted view serves a sun, and a light whose receivers lie within a cone; otherwise there are
 /// those faces of a cube that receivers stand before. No receivers, no views.
@@ -55,7 +56,11 @@ pub fn light_views(
     casters: &Aabb,
     margin: f64,
 ) -> LightViews {
-    let points: Vec<DVec3> = receivers.iter().flatten().copied().collect();
+    // A disk or rectangle gives no light behind its plane, so nobody there asks what blocks it.
+    let front = |p: &DVec3| (*p - light.center.as_dvec3()).dot(light.direction.as_dvec3()) > 0.0;
+    let counts = |hull: &&Vec<DVec3>| !light.shape.is_one_sided() || hull.iter().any(front);
+    let receivers: Vec<&Vec<DVec3>> = receivers.iter().filter(counts).collect();
+    let points: Vec<DVec3> = receivers.iter().copied().flatten().copied().collect();
     let mut views = LightViews {
         views: Vec::new(),
         clip_from_scene: Vec::new(),
@@ -88,7 +93,7 @@ pub fn light_views(
         views.push_perspective(center, [right, up, axis], low, high, near);
         return views;
     }
-    for (forward, up) in CUBE_FACES {
+    for [forward, up] in cube_faces(light) {
         let right = forward.cross(up);
         let sides = [right, -right, up, -up].map(|side| forward + side);
         let planes = [forward, sides[0], sides[1], sides[2], sides[3]];
@@ -117,15 +122,21 @@ pub fn light_views(
     views
 }
 
-/// Directions and up vectors of the faces of a cube.
-const CUBE_FACES: [(DVec3, DVec3); 6] = [
-    (DVec3::X, DVec3::Y),
-    (DVec3::NEG_X, DVec3::Y),
-    (DVec3::Y, DVec3::Z),
-    (DVec3::NEG_Y, DVec3::Z),
-    (DVec3::Z, DVec3::Y),
-    (DVec3::NEG_Z, DVec3::Y),
-];
+/// Directions and up vectors of the faces of a cube around a light. That of a flat light stands
+/// along it, so that its last face looks where the light does not.
+fn cube_faces(light: &AreaLight) -> Vec<[DVec3; 2]> {
+    let (x, y, z) = if light.shape.is_one_sided() {
+        let (x, z) = (light.axis_x.as_dvec3(), light.direction.as_dvec3());
+        (x, z.cross(x), z)
+    } else {
+        (DVec3::X, DVec3::Y, DVec3::Z)
+    };
+    let mut faces = vec![[z, y], [x, y], [-x, y], [y, x], [-y, x], [-z, y]];
+    if light.shape.is_one_sided() {
+        faces.pop();
+    }
+    faces
+}
 
 /// Where a hull may show on a face of the cube, within -1 to 1.
 fn extent_on_face(

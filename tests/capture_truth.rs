@@ -79,7 +79,9 @@ fn check(name: &str) {
         );
         assert!(count > 20_000, "{title}: there is something to measure");
         assert!(right >= least_right(name), "{title}: {right}");
-        let few = (0.05 * wrong.len() as f64).max(8.0);
+        // A pixel at the rim of a cut-out may show another surface than the ray through its centre
+        // meets, and have that one's shadow.
+        let few = 0.05 * wrong.len() as f64 + 1.0e-4 * f64::from(count);
         assert!(
             stray as f64 <= few,
             "{title}: {stray} of {} wrong pixels",

@@ -1,4 +1,10 @@
-.PHONY: help demo test bench clean-deps
+.PHONY: help demo test bench bench-check bench-plan clean-deps
+
+# For make bench: scenes, what is held against each other, picture size, and where it goes.
+SCENES ?= assets
+TECHNIQUES ?= all
+SIZE ?= 512x512
+OUT ?= out/bench
 
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/antumbra
 # For a shell that has not yet read what rustup added to the profile.
@@ -7,7 +13,9 @@ export PATH := $(PATH):$(or $(CARGO_HOME),$(HOME)/.cargo)/bin
 help:
 	@echo "make demo        set up this machine, build in release, capture a scene to out/"
 	@echo "make test        set up this machine, then run every check and test"
-	@echo "make bench       criterion benchmarks"
+	@echo "make bench       run time against error of all techniques over all scenes, to out/bench/"
+	@echo "make bench-check look at out/bench/report.html in headless Chromium"
+	@echo "make bench-plan  criterion benchmarks of the render graph"
 	@echo "make clean-deps  remove what set-up unpacked into .deps/"
 
 demo:
@@ -23,6 +31,14 @@ test:
 	scripts/check.sh
 
 bench:
+	scripts/setup.sh demo
+	cargo build --release
+	$(BIN) bench $(SCENES) --techniques '$(TECHNIQUES)' --size $(SIZE) --out $(OUT)
+
+bench-check:
+	scripts/report_browser.py $(OUT)/report.html $(OUT)/screenshots
+
+bench-plan:
 	scripts/setup.sh demo
 	cargo bench
 

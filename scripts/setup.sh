@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Makes a machine ready to build, run and test, and does nothing where all is there already.
-# usage: scripts/setup.sh demo|test     test adds what only the whole test run needs
+# usage: scripts/setup.sh demo|test|bench     test adds what only the whole test run needs, bench the ray tracer Embree
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 level=${1-}
 case $level in
-    demo | test) ;;
-    *) fail "usage: scripts/setup.sh demo|test" ;;
+    demo | test | bench) ;;
+    *) fail "usage: scripts/setup.sh demo|test|bench" ;;
 esac
 
 mkdir -p "$DEPS"
@@ -108,6 +108,13 @@ setup_shaderc() {
     fi
 }
 
+# Wanted, not needed: benchmarks fall back on the slower tracer of the references.
+setup_embree() {
+    if [ -f /usr/include/embree3/rtcore.h ] || [ -f /usr/local/include/embree3/rtcore.h ]; then return; fi
+    if is_debian_like && (install_packages libembree-dev); then return; fi
+    say "without Embree 3 (Debian: libembree-dev) the ray-tracing rival is not the fastest there is"
+}
+
 setup_rust() {
     local component
     for component in rustfmt clippy; do
@@ -119,7 +126,8 @@ setup_rust() {
 
 if is_debian_like; then setup_debian; else check_other; fi
 setup_shaderc
-if [ "$level" = demo ]; then
+if [ "$level" = bench ]; then setup_embree; fi
+if [ "$level" != test ]; then
     scripts/vulkan.sh layer || say "without the current validation layer some tests fail; run this again to fetch it"
 else
     scripts/vulkan.sh layer

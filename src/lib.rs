@@ -44,6 +44,8 @@ struct Readme;
 
 pub use ash;
 
+#[cfg(feature = "cli")]
+pub mod bench;
 pub mod capture;
 #[cfg(feature = "cli")]
 pub mod cli;
@@ -56,5 +58,9 @@ pub mod measure;
 #[cfg(feature = "cli")]
 pub mod reference;
 pub mod renderer;
+#[cfg(feature = "cli")]
+pub mod rival;
 pub mod scene;
 pub mod shadow;
+#[cfg(feature = "cli")]
+pub mod stress;

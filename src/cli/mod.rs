@@ -4,6 +4,7 @@
 //! at hand, 143 ended by SIGTERM. Every failure prints exactly one line, `error: ..`, to standard error.
 
 mod args;
+mod bench;
 mod capture;
 mod compare;
 mod error;
@@ -57,6 +58,7 @@ enum Command {
     Graph(graph::GraphArgs),
     Reference(Box<reference::ReferenceArgs>),
     Compare(compare::CompareArgs),
+    Bench(Box<bench::BenchArgs>),
 }
 
 /// Runs the program with `arguments`, of which the first is its own name, and returns its exit
@@ -71,6 +73,7 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
             Command::Graph(args) => graph::run(&args),
             Command::Reference(args) => reference::run(&args),
             Command::Compare(args) => compare::run(&args),
+            Command::Bench(args) => bench::run(&args),
         },
         Err(error) => match error.kind() {
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {

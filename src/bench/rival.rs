@@ -1,0 +1,94 @@
+//! Rivals: ray tracing on the CPU, on all cores.
+//!
+//! A new tracer adds one [`Engine`] and its [`Rival`].
+
+use super::contender::Rays;
+use crate::light::AreaLight;
+use crate::reference::{Reference, Sampling, Settings};
+use crate::scene::{Scene, SceneCamera};
+
+/// Why a rival has no picture.
+pub type RivalError = Box<dyn std::error::Error + Send + Sync>;
+
+/// A ray tracer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Engine {
+    /// The one that casts references ([`crate::reference`]).
+    Rays,
+}
+
+impl Engine {
+    /// All that this build has.
+    pub const ALL: &[Self] = &[Self::Rays];
+
+    /// The name before the `:` on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rays => "rays",
+        }
+    }
+
+    /// Builds what the tracer needs of a scene.
+    ///
+    /// # Errors
+    /// What the tracer has to say.
+    pub fn prepare(self, scene: &Scene) -> Result<Box<dyn Rival + '_>, RivalError> {
+        match self {
+            Self::Rays => Ok(Box::new(ReferenceRival(Reference::new(scene)?))),
+        }
+    }
+}
+
+/// What a rival is to cast.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// The camera.
+    pub camera: &'a SceneCamera,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// The light.
+    pub light: &'a AreaLight,
+    /// Rays a pixel.
+    pub rays: Rays,
+}
+
+/// What a rival has cast.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cast {
+    /// Part of the light that is seen, 0 to 1, rows from the top; 1 where nothing is hit.
+    pub visibility: Vec<f32>,
+    /// Rays cast towards the light.
+    pub rays: u64,
+}
+
+/// A tracer with its scene, ready to cast. The time of [`cast`](Self::cast) is the rival's time.
+pub trait Rival {
+    /// Casts one picture, primary rays included, on all cores.
+    ///
+    /// # Errors
+    /// What the tracer has to say.
+    fn cast(&mut self, view: &View<'_>) -> Result<Cast, RivalError>;
+}
+
+struct ReferenceRival<'s>(Reference<'s>);
+
+impl Rival for ReferenceRival<'_> {
+    fn cast(&mut self, view: &View<'_>) -> Result<Cast, RivalError> {
+        let sampling = match view.rays {
+            Rays::Plain(samples) => Sampling::Plain { samples },
+            Rays::Adaptive { first, more } => Sampling::Adaptive { first, more },
+        };
+        let settings = Settings {
+            camera: view.camera,
+            size: view.size,
+            light: view.light,
+            sampling: &sampling,
+        };
+        let truth = self.0.render(&settings, &|_| {})?;
+        Ok(Cast {
+            visibility: truth.visibility,
+            rays: truth.rays,
+        })
+    }
+}

@@ -1,0 +1,157 @@
+//! The same case in other guises, and a small step from where it was.
+
+use crate::compare::{Change, flipped, known};
+use crate::limits::{judge, limits};
+use crate::rig::{PIXELS, Rig};
+use crate::support;
+use antumbra::shadow::Technique;
+use antumbra::stress::{Case, SCALES, Similarity, cases};
+use glam::{DQuat, DVec3, EulerRot, Vec3};
+
+/// Part of the pixels that rounding may decide anew.
+const MAY_FLIP: f64 = 0.0005;
+
+fn can_do(technique: Technique, case: &Case) -> bool {
+    technique.check(case.area_light()).is_ok()
+}
+
+/// A uniform scale, and a place far away that is taken out when the file is read, change no more than
+/// one pixel in 2000: the map is fitted alike.
+#[test]
+fn scaled_or_far_away() {
+    let _one = support::serial();
+    let mut rig = Rig::new();
+    let mut faults = Vec::new();
+    for (number, case) in cases().iter().enumerate() {
+        let scales: Vec<f64> = match number {
+            3 => SCALES.to_vec(),
+            _ => vec![SCALES[0], SCALES[6]],
+        };
+        let far = DVec3::new(1.0e6, -2.5e5, 5.0e5);
+        let mut guises: Vec<Case> = (scales.into_iter())
+            .map(|scale| case.seen_as(&Similarity::scaled(scale)))
+            .collect();
+        if number % 4 == 3 {
+            let distances = [1.0e-4, 1.0e-2, 1.0];
+            guises.extend(distances.map(|part| case.through_file(part * far).unwrap()));
+        }
+        let mut known: Vec<_> = guises.iter().map(|guise| known(guise).sure).collect();
+        let here = crate::compare::known(case).sure;
+        for &technique in Technique::ALL {
+            if !can_do(technique, case) {
+                continue;
+            }
+            let before = rig.draw(case, technique);
+            let mut line = format!("{:28} {:5}", case.name, technique.name());
+            for (guise, sure) in guises.iter().zip(&mut known) {
+                let after = rig.draw(guise, technique);
+                let change = Change::of(&before, &after, |i| here[i] && sure[i], 1.0e-3);
+                line += &format!(" {}/{:.2}", change.changed, change.most);
+                if change.part() > MAY_FLIP {
+                    let title = format!("{}, {}", guise.name, technique.name());
+                    faults.push(format!("{title}: {change:?}"));
+                }
+            }
+            println!("{line}");
+        }
+    }
+    rig.end();
+    judge(&faults);
+}
+
+/// Turned, moved and mirrored: maps are fitted to boxes along the axes, so that their texels lie
+/// elsewhere. `hard` decides by triangles and hardly notices.
+#[test]
+fn turned_moved_or_mirrored() {
+    let _one = support::serial();
+    let mut rig = Rig::new();
+    let mut faults = Vec::new();
+    let turn = DQuat::from_euler(EulerRot::YXZ, 0.7, 1.9, -0.4);
+    let similarity = Similarity {
+        scale: 1.0,
+        turn,
+        shift: DVec3::new(9.0, -4.0, 7.0),
+    };
+    for case in cases() {
+        let here = known(&case);
+        let turned = case.seen_as(&similarity);
+        let mirrored = case.mirrored();
+        let there = known(&turned).sure;
+        for &technique in Technique::ALL {
+            if !can_do(technique, &case) {
+                continue;
+            }
+            let limits = limits(technique);
+            let before = rig.draw(&case, technique);
+            let sure = |i: usize| here.sure[i] && there[i];
+            let found = rig.draw(&turned, technique);
+            let image = flipped(&rig.draw(&mirrored, technique));
+            for (guise, after) in [("turned", found), ("mirrored", image)] {
+                let title = format!("{:28} {:5} {guise}", case.name, technique.name());
+                let change = Change::of(&before, &after, sure, 1.01 * limits.step.min(0.5));
+                println!(
+                    "{title}: {} of {} by more than a step, rms {:.3}, mean {:+.4}, most {:.2}",
+                    change.changed, change.pixels, change.rms, change.mean, change.most
+                );
+                let hard = technique == Technique::Hard;
+                let fine = if case.fine { limits.fine } else { MAY_FLIP };
+                if hard && change.part() > fine || change.rms > limits.turned {
+                    faults.push(format!("{title}: {change:?}"));
+                }
+                // What is finer than a texel may come and go as a whole.
+                let shift = if case.fine { limits.fine } else { 0.0 };
+                if change.mean.abs() > shift.max(limits.turned_mean) {
+                    faults.push(format!(
+                        "{title}: the whole picture changes by {}",
+                        change.mean
+                    ));
+                }
+            }
+        }
+    }
+    rig.end();
+    judge(&faults);
+}
+
+/// Light and camera go on by a millimetre or so a frame: no flicker.
+#[test]
+fn a_small_move_is_a_small_change() {
+    let _one = support::serial();
+    let mut rig = Rig::new();
+    let mut faults = Vec::new();
+    for case in cases() {
+        let sun = case.area_light().shape.is_sun();
+        let light = Vec3::new(0.6, 0.0, 0.8) * if sun { 5.0e-4 } else { 1.0e-3 };
+        let camera = Vec3::new(0.3, 0.4, -0.2) * 1.0e-3 * case.camera.position.length() / 5.0;
+        let moves = [
+            ("light", case.light_moved(light)),
+            ("camera", case.camera_moved(camera)),
+        ];
+        let here = known(&case);
+        for (what, moved) in moves {
+            let there = known(&moved);
+            let sure = |i: usize| here.sure[i] && there.sure[i];
+            let truth = Change::of(&here.center, &there.center, sure, 0.5);
+            for &technique in Technique::ALL {
+                if !can_do(technique, &case) {
+                    continue;
+                }
+                let limits = limits(technique);
+                let before = rig.draw(&case, technique);
+                let after = rig.draw(&moved, technique);
+                let change = Change::of(&before, &after, sure, limits.jump);
+                let title = format!("{:28} {:5} {what}", case.name, technique.name());
+                println!(
+                    "{title}: {} of {} jump (truth {}), 99.9 % within {:.3}, mean {:+.5}",
+                    change.changed, change.pixels, truth.changed, change.p999, change.mean
+                );
+                if change.part() > truth.part() + limits.jumps {
+                    faults.push(format!("{title}: {change:?}, of the truth {truth:?}"));
+                }
+            }
+        }
+    }
+    assert_eq!(PIXELS, 64 * 64);
+    rig.end();
+    judge(&faults);
+}

@@ -1,0 +1,100 @@
+//! What each technique may be off by, and why. A technique that is not here fails every test.
+
+use antumbra::shadow::Technique;
+
+/// Limits of one technique. Parts are of the pixels that can be compared.
+pub struct Limits {
+    /// What one sample more or less changes a pixel by.
+    pub step: f32,
+    /// Part of pixels off under a light of no size, in cases of shadows finer than a texel.
+    pub fine: f64,
+    /// Part of pixels of an empty, closed room that are not fully lit.
+    pub own_walls: f64,
+    /// Root mean square change of partly lit pixels when scene, light and camera turn together.
+    pub turned: f64,
+    /// Change of the mean of all pixels then.
+    pub turned_mean: f64,
+    /// Part of pixels that one blocker more brightens by more than a step.
+    pub brighter: f64,
+    /// Part of pixels that a small move of light or camera changes by more than `jump`.
+    pub jumps: f64,
+    /// A change that counts as a jump.
+    pub jump: f32,
+}
+
+pub fn limits(technique: Technique) -> Limits {
+    match technique.name() {
+        // One ray decides a pixel. Triangles narrower than a texel are found by depths alone, so an
+        // edge may be off by a texel there, and where it lies depends on the grid of the map.
+        "hard" => Limits {
+            step: 1.0,
+            fine: 0.005,
+            own_walls: 0.0,
+            turned: 1.0,
+            turned_mean: 0.002,
+            brighter: 0.0005,
+            jumps: 0.002,
+            jump: 0.5,
+        },
+        // The filter reaches 2.5 texels whatever the light: shadows narrower than that blur away. Its
+        // taps fall on other texels once the map is fitted anew (boxes lie along the axes, so a turn
+        // changes the fit): an edge is up to 0.71 texels off in either map, 1.42 of the 5 that the
+        // filter is wide, at the slope of a disk's area, 4 / pi: 0.36. With the fit fixed a texel can
+        // only get nearer to the light.
+        "pcf" => Limits {
+            step: 1.0 / 32.0,
+            fine: 0.06,
+            own_walls: 0.0,
+            turned: 0.36,
+            turned_mean: 0.002,
+            brighter: 0.0,
+            jumps: 0.005,
+            jump: 0.25,
+        },
+        // As pcf where the filter is narrow. The area searched for blockers follows boxes along the
+        // axes, so a turn changes what is found: a fault of the method, measured as 0.35 and, of the
+        // whole picture, 0.025 under a grazing light. Near concave edges the neighbouring wall is in front
+        // of the receiver's plane, which is taken to go on. A blocker more changes the mean distance
+        // of blockers, and with it the width of every filter that finds it: 4.5 % of pixels
+        // at most, by 0.28 at most.
+        "pcss" => Limits {
+            step: 1.0 / 32.0,
+            fine: 0.01,
+            own_walls: 0.002,
+            turned: 0.4,
+            turned_mean: 0.03,
+            brighter: 0.06,
+            jumps: 0.005,
+            jump: 0.25,
+        },
+        // Blockers move to the nearest of 32 planes, and their outlines to texels of 1/512 of the map:
+        // up to 0.12 of V in the worst place by the depth of a slice (floor of the model). Where slices
+        // end depends on the box around the scene, and with it on a turn and on a blocker more.
+        "occlusion-textures" => Limits {
+            step: 1.0 / 16.0,
+            fine: 0.06,
+            own_walls: 0.0,
+            turned: 0.12,
+            turned_mean: 0.01,
+            brighter: 0.03,
+            jumps: 0.005,
+            jump: 0.25,
+        },
+        other => panic!("state the limits of technique `{other}` in {}", file!()),
+    }
+}
+
+/// Techniques that are not finished: their faults are printed and do not fail. An entry goes when its
+/// technique is done.
+const IN_WORK: [&str; 1] = ["occlusion-textures"];
+
+/// Fails on faults of finished techniques.
+#[track_caller]
+pub fn judge(faults: &[String]) {
+    let in_work = |fault: &&String| IN_WORK.iter().any(|name| fault.contains(name));
+    let (open, failed): (Vec<&String>, Vec<&String>) = faults.iter().partition(in_work);
+    for fault in open {
+        println!("not finished: {fault}");
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}

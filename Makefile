@@ -5,6 +5,8 @@ SCENES ?= assets
 TECHNIQUES ?= all
 SIZE ?= 512x512
 OUT ?= out/bench
+# The strongest ray tracer, where its library is: asked by the shell, after set-up may have installed it.
+EMBREE = $$([ -f /usr/include/embree3/rtcore.h ] || [ -f /usr/local/include/embree3/rtcore.h ] && echo --features embree)
 
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/antumbra
 # For a shell that has not yet read what rustup added to the profile.
@@ -31,8 +33,8 @@ test:
 	scripts/check.sh
 
 bench:
-	scripts/setup.sh demo
-	cargo build --release
+	scripts/setup.sh bench
+	cargo build --release $(EMBREE)
 	$(BIN) bench $(SCENES) --techniques '$(TECHNIQUES)' --size $(SIZE) --out $(OUT)
 
 bench-check:

@@ -376,7 +376,7 @@ impl RivalRunner<'_> {
         let cast = cast.map_err(|error| with_sources(&*error))?;
         Ok(Round {
             visibility: cast.visibility,
-            visibility_ms: Some(ms),
+            visibility_ms: Some(cast.ms.unwrap_or(ms)),
             counters: [("rays".to_string(), cast.rays)].into(),
             ..Default::default()
         })

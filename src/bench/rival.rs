@@ -16,16 +16,25 @@ pub type RivalError = Box<dyn std::error::Error + Send + Sync>;
 pub enum Engine {
     /// The one that casts references ([`crate::reference`]).
     Rays,
+    /// Embree ([`crate::rival`]).
+    #[cfg(feature = "embree")]
+    Embree,
 }
 
 impl Engine {
     /// All that this build has.
-    pub const ALL: &[Self] = &[Self::Rays];
+    pub const ALL: &[Self] = &[
+        Self::Rays,
+        #[cfg(feature = "embree")]
+        Self::Embree,
+    ];
 
     /// The name before the `:` on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Rays => "rays",
+            #[cfg(feature = "embree")]
+            Self::Embree => "embree",
         }
     }
 
@@ -36,6 +45,11 @@ impl Engine {
     pub fn prepare(self, scene: &Scene) -> Result<Box<dyn Rival + '_>, RivalError> {
         match self {
             Self::Rays => Ok(Box::new(ReferenceRival(Reference::new(scene)?))),
+            #[cfg(feature = "embree")]
+            Self::Embree => Ok(Box::new(EmbreeRival {
+                tracer: crate::rival::Rival::new(scene)?,
+                prepared: None,
+            })),
         }
     }
 }
@@ -60,11 +74,13 @@ pub struct Cast {
     pub visibility: Vec<f32>,
     /// Rays cast towards the light.
     pub rays: u64,
+    /// Milliseconds that count; `None` for the whole of the call.
+    pub ms: Option<f64>,
 }
 
-/// A tracer with its scene, ready to cast. The time of [`cast`](Self::cast) is the rival's time.
+/// A tracer with its scene, ready to cast.
 pub trait Rival {
-    /// Casts one picture, primary rays included, on all cores.
+    /// Casts one picture on all cores.
     ///
     /// # Errors
     /// What the tracer has to say.
@@ -89,6 +105,36 @@ impl Rival for ReferenceRival<'_> {
         Ok(Cast {
             visibility: truth.visibility,
             rays: truth.rays,
+            ms: None,
+        })
+    }
+}
+
+/// Its time begins at the surface points, which a renderer has in its G-buffer.
+#[cfg(feature = "embree")]
+struct EmbreeRival<'s> {
+    tracer: crate::rival::Rival<'s>,
+    prepared: Option<(SceneCamera, [u32; 2])>,
+}
+
+#[cfg(feature = "embree")]
+impl Rival for EmbreeRival<'_> {
+    fn cast(&mut self, view: &View<'_>) -> Result<Cast, RivalError> {
+        let is_prepared =
+            |(camera, size): &(SceneCamera, [u32; 2])| camera == view.camera && *size == view.size;
+        if !self.prepared.as_ref().is_some_and(is_prepared) {
+            self.tracer.prepare(view.camera, view.size)?;
+            self.prepared = Some((view.camera.clone(), view.size));
+        }
+        let sampling = match view.rays {
+            Rays::Plain(rays) => crate::rival::RivalSampling::Plain(rays),
+            Rays::Adaptive { first, more } => crate::rival::RivalSampling::Adaptive { first, more },
+        };
+        let casting = self.tracer.cast(view.light, sampling)?;
+        Ok(Cast {
+            visibility: casting.visibility,
+            rays: casting.rays,
+            ms: Some(casting.ms),
         })
     }
 }

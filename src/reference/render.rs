@@ -398,7 +398,9 @@ impl<'a> Band<'a> {
             return;
         }
         beam.clear();
-        let sequence = Sequence::new(self.in_picture(at));
+        // A rival that cast the truth's own samples would look better than it is.
+        let rival = !matches!(self.settings.sampling, Sampling::Estimated { .. });
+        let sequence = Sequence::new(self.in_picture(at) | u64::from(rival) << 63);
         for index in first..count {
             let place = sequence.point(index);
             let end = light.spread(place);

@@ -175,7 +175,7 @@ pub(super) fn edges() -> Vec<Case> {
     let over_pole = AreaLight::new(DISK, vec3(0.0, 3.0, 0.0), Vec3::NEG_Y, Vec3::X);
     let rays = (0..6).flat_map(|i| {
         // Each board holds a line through the light's centre.
-        let (z, x) = (1.0471976 * i as f32).sin_cos();
+        let (z, x) = (std::f32::consts::FRAC_PI_3 * i as f32).sin_cos();
         let foot = vec3(1.2 * x, 0.0, 1.2 * z);
         let along = (vec3(0.0, 3.0, 0.0) - foot) * 0.15;
         patch(foot + 1.6 * along, along, vec3(-0.12 * z, 0.0, 0.12 * x))

@@ -206,13 +206,11 @@ fn the_same_scene_in_other_guises() {
             let (count, most) = changes(&truth, &found, 1.01 / SAMPLES as f32);
             line += &format!(" {name}: {count} to {most:.2}");
             if count > MAY_FLIP {
-                let surfaces = surfaces(&case);
-                for i in 0..PIXELS {
+                for (i, surface) in surfaces(&case).into_iter().enumerate() {
                     let (v, w) = (truth.visibility[i], found.visibility[i]);
                     if truth.valid[i] && found.valid[i] && (v - w).abs() > 1.01 / SAMPLES as f32 {
                         let at = (i % 64, i / 64);
-                        let s =
-                            surfaces[i].map(|s| (s.position, s.normal, s.primitive, s.triangle));
+                        let s = surface.map(|s| (s.position, s.normal, s.primitive, s.triangle));
                         println!("{} {at:?}: {v} {name} {w}: {s:?}", case.name);
                     }
                 }

@@ -21,7 +21,7 @@
 //! Every time is a [`Spread`] over the measured rounds. `visibility_ms` of a technique adds up the
 //! device's timestamps of the passes that make one light's visibility, without G-buffer and
 //! shading; `frame_ms` is the host's wall clock of the whole frame with this light alone. A rival's
-//! `visibility_ms` is the wall clock of its whole casting, primary rays included, on all cores with
+//! `visibility_ms` is the wall clock of its casting on all cores (of `rays` primary rays included), with
 //! its hierarchy built beforehand; it has neither `frame_ms` nor `passes`.
 
 pub mod contender;

@@ -25,6 +25,7 @@ for file in tests/*.rs tests/*/main.rs; do
     name=${name%.rs}
     name=${name%/main}
     case $name in
+        capture_stress) ;; # see gpu_step
         gpu_* | shader_* | capture* | cli* | embed* | host* | golden*) gpu_tests+=(--test "$name") ;;
         *) other_tests+=(--test "$name") ;;
     esac
@@ -47,6 +48,8 @@ step() {
 gpu_step() {
     if [ ${#gpu_tests[@]} -eq 0 ]; then return; fi
     step "GPU tests on $1" cargo test "${gpu_tests[@]}" -- --test-threads=1
+    # All relations over all stress scenes take minutes: once, and elsewhere each scene by itself.
+    step "stress scenes on $1" cargo test --test capture_stress -- --test-threads=1 "${@:2}"
 }
 
 step "format" cargo fmt --check
@@ -60,7 +63,7 @@ gpu_step "the system's lavapipe"
 for driver in lavapipe swiftshader; do
     if [ ! -f ".deps/vulkan/$driver/version" ]; then continue; fi
     use_driver "$PWD/.deps/vulkan/$driver/icd.json"
-    gpu_step "$driver of $(cat ".deps/vulkan/$driver/version")"
+    gpu_step "$driver of $(cat ".deps/vulkan/$driver/version")" every_case
 done
 
 printf '\n'

@@ -4,6 +4,7 @@ pub mod hard;
 mod light_params;
 mod light_view;
 mod map;
+pub mod occlusion_textures;
 pub mod pcss;
 mod receivers;
 mod technique;

@@ -2,6 +2,7 @@
 //!
 //! A new technique adds its module, one variant here with its arms, and its folder of shaders.
 
+use super::occlusion_textures::{self, OcclusionOptions};
 use super::pcss::PcssOptions;
 use super::{ShadowInputs, ShadowMask, hard, pcss};
 use crate::graph::Graph;
@@ -17,6 +18,8 @@ pub enum Technique {
     Pcf(PcssOptions),
     /// A filter over a shadow map as wide as the light looks through the blockers' mean depth.
     Pcss(PcssOptions),
+    /// Slices of the scene as textures, averaged over what the light covers of them.
+    OcclusionTextures(OcclusionOptions),
 }
 
 /// One option of a technique.
@@ -112,6 +115,7 @@ impl Technique {
             ..PcssOptions::DEFAULT
         }),
         Self::Pcss(PcssOptions::DEFAULT),
+        Self::OcclusionTextures(OcclusionOptions::DEFAULT),
     ];
 
     /// The name on the command line and in reports.
@@ -120,6 +124,7 @@ impl Technique {
             Self::Hard => "hard",
             Self::Pcf(_) => "pcf",
             Self::Pcss(_) => "pcss",
+            Self::OcclusionTextures(_) => occlusion_textures::NAME,
         }
     }
 
@@ -130,6 +135,9 @@ impl Technique {
             Self::Pcf(_) => "a shadow map, filtered over an area of fixed size",
             Self::Pcss(_) => {
                 "a shadow map, filtered over what the light covers at the blockers' mean distance"
+            }
+            Self::OcclusionTextures(_) => {
+                "slices of the scene, each averaged over what the light covers of it"
             }
         }
     }
@@ -143,6 +151,10 @@ impl Technique {
                  SIGGRAPH 1987"
             }
             Self::Pcss(_) => "R. Fernando: Percentage-Closer Soft Shadows. SIGGRAPH 2005 Sketches",
+            Self::OcclusionTextures(_) => {
+                "E. Eisemann, X. Decoret: Plausible Image Based Soft Shadows Using Occlusion \
+                 Textures. SIBGRAPI 2006"
+            }
         })
     }
 
@@ -150,6 +162,7 @@ impl Technique {
     pub fn shapes(self) -> &'static [ShapeKind] {
         match self {
             Self::Hard | Self::Pcf(_) | Self::Pcss(_) => &ShapeKind::ALL,
+            Self::OcclusionTextures(_) => occlusion_textures::SHAPES,
         }
     }
 
@@ -159,6 +172,7 @@ impl Technique {
             Self::Hard => &[],
             Self::Pcf(_) => &[TAPS, RADIUS, PATTERN],
             Self::Pcss(_) => &[TAPS, SEARCH, PATTERN],
+            Self::OcclusionTextures(_) => OcclusionOptions::ALL,
         }
     }
 
@@ -169,6 +183,7 @@ impl Technique {
             Self::Hard => Vec::new(),
             Self::Pcf(o) => vec![o.taps.to_string(), o.radius.to_string(), pattern(o)],
             Self::Pcss(o) => vec![o.taps.to_string(), o.search.to_string(), pattern(o)],
+            Self::OcclusionTextures(o) => o.values(),
         };
         let names = self.options().iter().map(|option| option.name);
         names.zip(values).collect()
@@ -178,6 +193,7 @@ impl Technique {
     fn set(&mut self, option: &str, value: &str) -> Option<()> {
         let count = || value.parse::<u32>().ok().filter(|n| (1..=256).contains(n));
         match (self, option) {
+            (Self::OcclusionTextures(o), _) => o.set(option, value)?,
             (Self::Pcf(o) | Self::Pcss(o), "taps") => o.taps = count()?,
             (Self::Pcss(o), "search") => o.search = count()?,
             (Self::Pcf(o), "radius") => {
@@ -217,6 +233,9 @@ impl Technique {
     pub fn add_passes<'f>(self, graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -> ShadowMask {
         match self {
             Self::Hard => hard::add_passes(graph, inputs),
+            Self::OcclusionTextures(options) => {
+                occlusion_textures::add_passes(graph, inputs, options)
+            }
             Self::Pcf(options) | Self::Pcss(options) => {
                 pcss::add_passes(graph, inputs, self.name(), options)
             }

@@ -1,0 +1,39 @@
+#version 460
+// What part of each texel each group blocks, and what part it and all groups nearer to the light
+// block together.
+
+#include "occlusion_textures/groups.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(constant_id = 0) const int WORDS = 1;
+layout(constant_id = 1) const int FINER = 1; // texels of the bits across
+
+layout(set = 0, binding = 0) uniform usampler2DArray bits;
+layout(set = 0, binding = 1, std140) uniform GroupBlock {
+    SliceGroups groups;
+};
+layout(set = 0, binding = 2, rgba16f) uniform writeonly image2DArray averages;
+
+void main() {
+    ivec3 place = ivec3(gl_GlobalInvocationID);
+    uint group = gl_GlobalInvocationID.z;
+    if (any(greaterThanEqual(place.xy, imageSize(averages).xy)) || group >= groups.count.x) {
+        return;
+    }
+    uvec4 prefix = uvec4(0u);
+    for (uint i = 0u; i <= group; ++i) {
+        prefix |= groups.masks[i];
+    }
+    vec2 sum = vec2(0.0);
+    for (int sub = 0; sub < FINER * FINER; ++sub) {
+        ivec2 at = FINER * place.xy + ivec2(sub % FINER, sub / FINER);
+        uvec2 hit = uvec2(0u);
+        for (int word = 0; word < WORDS; ++word) {
+            uint found = texelFetch(bits, ivec3(at, word), 0).x;
+            hit |= found & uvec2(groups.masks[group][word], prefix[word]);
+        }
+        sum += vec2(notEqual(hit, uvec2(0u)));
+    }
+    imageStore(averages, place, vec4(sum / float(FINER * FINER), 0.0, 0.0));
+}

@@ -1,0 +1,109 @@
+//! Technique `occlusion-textures`: plausible image based soft shadows (E. Eisemann, X. Décoret,
+//! SIBGRAPI 2006).
+//!
+//! The scene is cut into slices across the light's axis; what a slice blocks is a binary texture,
+//! and the part of a light that it hides from a point is the texture's mean over the box that the
+//! light covers of it, seen from there. Prefiltered textures give that mean at once, so neither the
+//! light's size nor the width of a penumbra changes the cost of a pixel.
+//!
+//! Beside what was published: fine slices are cut first and joined where something is, so that none
+//! is spent on empty space; boxes are averaged exactly, from summed-area tables of whole numbers;
+//! and textures are combined by what each adds to those before it, which neither lets light leak
+//! through a surface that slices cut, nor darkens blockers that lie behind each other twice.
+//!
+//! | pass | makes |
+//! |---|---|
+//! | `params` | views, planes |
+//! | `slices` | a channel for each of 32 slices, by maximum |
+//! | `pack` | bits of them |
+//! | `any` | a pyramid of what slices hold anything in a square of texels |
+//! | `groups` | the occlusion textures: runs of occupied slices |
+//! | `rows`, `columns` | their summed-area tables |
+//! | `start`, `tiles` | the picture's tiles that need work |
+//! | `visibility` | visibility |
+
+mod options;
+mod prefilter;
+mod slices;
+mod views;
+mod visibility;
+
+pub use options::{Combine, Filter, Fit, OcclusionOptions, Planes, Projection};
+
+use super::receivers::add_receivers;
+use super::{ShadowInputs, ShadowMask};
+use crate::graph::{Graph, ImageDesc, PassKind};
+use crate::light::{AreaLight, LightShape, ShapeKind};
+use ash::vk;
+
+/// The technique's name.
+pub(super) const NAME: &str = "occlusion-textures";
+
+/// Light shapes that have an area to cut boxes from.
+pub(super) const SHAPES: &[ShapeKind] = &[
+    ShapeKind::Rect,
+    ShapeKind::Disk,
+    ShapeKind::Sphere,
+    ShapeKind::Sun,
+];
+
+/// Declares the passes.
+pub(super) fn add_passes<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: OcclusionOptions,
+) -> ShadowMask {
+    let boxes: Vec<_> = inputs
+        .scene
+        .draws()
+        .iter()
+        .map(|draw| draw.bounds)
+        .collect();
+    let views = views::sliced_views(&inputs.light, &inputs.receivers, &boxes, &options);
+    let sliced: Vec<_> = views
+        .into_iter()
+        .enumerate()
+        .map(|(index, view)| {
+            let slices = slices::add_slices(graph, inputs, &options, &view, index);
+            let filtered = prefilter::add_prefilter(graph, inputs, &options, &slices, index);
+            (slices, filtered)
+        })
+        .collect();
+    let receivers = add_receivers(graph, inputs, NAME, reach(&inputs.light));
+    let mut mask = receivers.visibility;
+    for (index, (slices, filtered)) in sliced.iter().enumerate() {
+        mask = visibility::add_visibility(
+            graph,
+            inputs,
+            &options,
+            (slices, filtered),
+            (receivers.list, mask),
+            index,
+        );
+    }
+    if sliced.is_empty() {
+        // Nothing in the picture: the tiles are all settled, or there is nothing to cast.
+        return ShadowMask::new(settled(graph, inputs));
+    }
+    ShadowMask::new(mask)
+}
+
+/// An image of full visibility.
+fn settled(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> crate::graph::ImageId {
+    let [width, height] = inputs.camera.size();
+    let name = &inputs.light_name;
+    let desc = ImageDesc::new(vk::Format::R32_SFLOAT, width, height);
+    let image = graph.create_image(format!("visibility {name}"), desc);
+    let mut pass = graph.pass(format!("{NAME}.visibility {name}"), PassKind::Transfer);
+    let image = pass.overwrite(image, crate::graph::Access::Clear);
+    pass.record(move |ctx| ctx.clear_image(image, [1.0; 4]));
+    image
+}
+
+/// Distance from the light's centre to its farthest point, of a sun at distance 1.
+fn reach(light: &AreaLight) -> f32 {
+    match light.shape {
+        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
+        shape => shape.bounding_radius(),
+    }
+}

@@ -1,0 +1,193 @@
+//! Filtering occlusion textures ahead of the pixels.
+
+use super::options::{Filter, OcclusionOptions};
+use super::slices::Slices;
+use super::{NAME, ShadowInputs};
+use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
+use crate::graph::{Access, Bind, Graph, ImageDesc, ImageId, ImagePart, PassKind, Stage};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+
+/// A view's filtered textures.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Filtered {
+    /// Tables: R32_UINT, one texel larger than a texture. Other filters: averages.
+    pub image: ImageId,
+    /// Whether a table's word holds two sums of 16 bits.
+    pub packed: bool,
+    /// Levels of averages.
+    pub levels: u32,
+}
+
+pub(super) fn add_prefilter<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: &OcclusionOptions,
+    slices: &Slices,
+    index: usize,
+) -> Filtered {
+    let name = format!("{}.{index}", inputs.light_name);
+    match options.filter {
+        Filter::SummedAreas => add_tables(graph, &name, options, slices),
+        _ => add_averages(graph, &name, options, slices),
+    }
+}
+
+fn add_tables(
+    graph: &mut Graph<'_>,
+    name: &str,
+    options: &OcclusionOptions,
+    slices: &Slices,
+) -> Filtered {
+    let side = options.resolution / options.detail;
+    // Boxes count texels of the bits; half a texel more on each side is for their borders.
+    let bits = f64::from(options.resolution);
+    let most = (slices.most_kernel.sqrt() * bits + 4.0 * f64::from(options.detail)).powi(2);
+    let packed = most < 65_536.0;
+    let layers = options.slices * if packed { 1 } else { 2 };
+    let desc = ImageDesc::new(vk::Format::R32_UINT, side + 1, side + 1).layers(layers);
+    let tables = graph.create_image(format!("{NAME}.tables {name}"), desc);
+    let constants = vec![
+        (0, options.words()),
+        (1, options.detail),
+        (2, u32::from(packed)),
+    ];
+    let (bits, groups) = (slices.bits, slices.groups);
+    let most_groups = options.slices;
+    let mut pass = graph.pass(format!("{NAME}.rows {name}"), PassKind::Compute);
+    pass.read(bits, Access::Sampled(Stage::Compute));
+    pass.read(groups, Access::Uniform(Stage::Compute));
+    let tables = pass.overwrite(tables, Access::StorageWrite(Stage::Compute));
+    let row_constants = constants.clone();
+    pass.record(move |ctx| {
+        let shader = &spirv::OCCLUSION_TEXTURES_SAT_ROWS_COMP;
+        let bindings = [
+            Bind::sampled(0, bits, SamplerDesc::nearest()).array(),
+            Bind::uniform(1, groups),
+            Bind::storage_image(2, tables).array(),
+        ];
+        let pipeline = ComputePipelineDesc {
+            constants: row_constants,
+            ..ComputePipelineDesc::new(shader)
+        };
+        ctx.bind_compute(&pipeline, &bindings, &[])?;
+        ctx.dispatch(shader.groups([side, most_groups.div_ceil(4), 1]));
+        Ok(())
+    });
+    let mut pass = graph.pass(format!("{NAME}.columns {name}"), PassKind::Compute);
+    pass.read(groups, Access::Uniform(Stage::Compute));
+    let tables = pass.write(tables, Access::StorageReadWrite(Stage::Compute));
+    pass.record(move |ctx| {
+        let shader = &spirv::OCCLUSION_TEXTURES_SAT_COLUMNS_COMP;
+        let bindings = [
+            Bind::uniform(0, groups),
+            Bind::storage_image(1, tables).array(),
+        ];
+        let pipeline = ComputePipelineDesc {
+            constants: vec![(2, u32::from(packed))],
+            ..ComputePipelineDesc::new(shader)
+        };
+        ctx.bind_compute(&pipeline, &bindings, &[])?;
+        ctx.dispatch(shader.groups([side + 1, layers, 1]));
+        Ok(())
+    });
+    Filtered {
+        image: tables,
+        packed,
+        levels: 0,
+    }
+}
+
+/// Push constants of `average_level.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct LevelPush {
+    apart: i32,
+}
+
+/// Averages of squares: N-buffers have the levels in layers, mipmaps in mip levels.
+fn add_averages(
+    graph: &mut Graph<'_>,
+    name: &str,
+    options: &OcclusionOptions,
+    slices: &Slices,
+) -> Filtered {
+    let side = options.resolution / options.detail;
+    let mipmaps = options.filter == Filter::Mipmaps;
+    let layers = options.slices;
+    let desc = ImageDesc::new(vk::Format::R16G16B16A16_SFLOAT, side, side);
+    let levels = desc.max_mips();
+    let desc = if mipmaps {
+        desc.layers(layers).mips(levels)
+    } else {
+        desc.layers(layers * levels)
+    };
+    let level_part = move |level: u32| ImagePart {
+        base_mip: if mipmaps { level } else { 0 },
+        mips: 1,
+        base_layer: if mipmaps { 0 } else { level * layers },
+        layers,
+    };
+    let averages = graph.create_image(format!("{NAME}.averages {name}"), desc);
+    let (bits, groups) = (slices.bits, slices.groups);
+    let constants = vec![(0, options.words()), (1, options.detail)];
+    let mut pass = graph.pass(format!("{NAME}.averages {name}.0"), PassKind::Compute);
+    pass.read(bits, Access::Sampled(Stage::Compute));
+    pass.read(groups, Access::Uniform(Stage::Compute));
+    let part = level_part(0);
+    let mut averages = pass.overwrite_part(averages, part, Access::StorageWrite(Stage::Compute));
+    let written = averages;
+    pass.record(move |ctx| {
+        let shader = &spirv::OCCLUSION_TEXTURES_AVERAGE_BASE_COMP;
+        let bindings = [
+            Bind::sampled(0, bits, SamplerDesc::nearest()).array(),
+            Bind::uniform(1, groups),
+            Bind::storage_image(2, written).part(part).array(),
+        ];
+        let pipeline = ComputePipelineDesc {
+            constants,
+            ..ComputePipelineDesc::new(shader)
+        };
+        ctx.bind_compute(&pipeline, &bindings, &[])?;
+        ctx.dispatch(shader.groups([side, side, layers]));
+        Ok(())
+    });
+    for level in 1..levels {
+        let mut pass = graph.pass(format!("{NAME}.averages {name}.{level}"), PassKind::Compute);
+        let (finer, part) = (level_part(level - 1), level_part(level));
+        pass.read_part(averages, finer, Access::Sampled(Stage::Compute));
+        pass.read(groups, Access::Uniform(Stage::Compute));
+        averages = pass.overwrite_part(averages, part, Access::StorageWrite(Stage::Compute));
+        let written = averages;
+        pass.record(move |ctx| {
+            let shader = &spirv::OCCLUSION_TEXTURES_AVERAGE_LEVEL_COMP;
+            let bindings = [
+                Bind::sampled(0, written, SamplerDesc::nearest())
+                    .part(finer)
+                    .array(),
+                Bind::uniform(1, groups),
+                Bind::storage_image(2, written).part(part).array(),
+            ];
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(0, u32::from(mipmaps))],
+                ..ComputePipelineDesc::new(shader)
+            };
+            let push = LevelPush {
+                apart: 1 << (level - 1),
+            };
+            ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
+            let size = if mipmaps {
+                (side >> level).max(1)
+            } else {
+                side
+            };
+            ctx.dispatch(shader.groups([size, size, layers]));
+            Ok(())
+        });
+    }
+    Filtered {
+        image: averages,
+        packed: false,
+        levels,
+    }
+}

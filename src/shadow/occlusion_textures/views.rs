@@ -1,0 +1,663 @@
+//! Where the scene is cut into slices from: centres of projection, depth ranges, slice planes.
+
+use super::options::{OcclusionOptions, Planes, Projection};
+use crate::light::{AreaLight, LightShape};
+use crate::scene::Aabb;
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat4, DVec3, DVec4, Mat4};
+
+/// `OcclusionView` in `occlusion_textures/params.glsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub(super) struct OcclusionView {
+    pub right: [f32; 4],
+    pub up: [f32; 4],
+    pub forward: [f32; 4],
+    pub scale: [f32; 4],
+    pub range: [f32; 4],
+    pub half_x: [f32; 4],
+    pub half_y: [f32; 4],
+}
+
+/// A view with what it takes to draw it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SlicedView {
+    pub params: OcclusionView,
+    /// Scene space to the clip space of the centre of projection, depth clamped by nothing: all in
+    /// front of it is drawn.
+    pub clip_from_scene: Mat4,
+    /// Metres along the view: dot(xyz, p) + w.
+    pub depth: [f32; 4],
+    /// Depths of the planes between fine slices, one more than there are slices.
+    pub planes: Vec<f32>,
+    /// Most texels, of an image of 1 texel, that a kernel can cover: its area as a part of the image.
+    pub most_kernel: f64,
+}
+
+/// Widest half angle of a single view, as a slope: beyond it, texels at the rim are 5.6 times as
+/// wide as those in the middle, and the faces of a cube are finer.
+const WIDEST: f64 = 2.14;
+
+/// Nearest slice plane, as a part of the farthest one's depth. Blockers between it and the light fall
+/// into the first slice.
+const NEAREST: f64 = 0.02;
+
+/// Texels kept free around what is looked at, as a part of the image.
+const MARGIN: f64 = 2.0 / 512.0;
+
+/// Kernels reach at most this far beyond what receivers project to, as a part of that.
+const MOST_REACH: f64 = 1.0;
+
+/// Slope up to which a face of a cube is looked through: a little more than its own 45 degrees, so
+/// that rounding leaves no gap.
+const FACE: f64 = 1.0 + 1.0e-5;
+
+/// Directions of a light's own frame.
+#[derive(Clone, Copy)]
+struct Frame {
+    right: DVec3,
+    up: DVec3,
+    forward: DVec3,
+}
+
+impl Frame {
+    fn of(&self, q: DVec3) -> DVec3 {
+        DVec3::new(q.dot(self.right), q.dot(self.up), q.dot(self.forward))
+    }
+}
+
+/// The views of a light; none where it has nothing to look at. `receivers` are hulls of all surfaces
+/// that need its visibility, `casters` boxes around all triangles.
+pub(super) fn sliced_views(
+    light: &AreaLight,
+    receivers: &[Vec<DVec3>],
+    casters: &[Aabb],
+    options: &OcclusionOptions,
+) -> Vec<SlicedView> {
+    let points: Vec<DVec3> = receivers.iter().flatten().copied().collect();
+    if points.is_empty() || casters.is_empty() {
+        return Vec::new();
+    }
+    let center = light.center.as_dvec3();
+    let [x, y, z] = [light.axis_x, light.axis_y, light.direction].map(|v| v.as_dvec3());
+    let own = Frame {
+        right: x,
+        up: -y,
+        forward: z,
+    };
+    if light.shape.is_sun() {
+        return vec![sun_view(light, own, &points, casters, options)];
+    }
+    let flat = matches!(
+        light.shape,
+        LightShape::Rect { .. } | LightShape::Disk { .. }
+    );
+    let axis = if flat {
+        own
+    } else {
+        let sum: DVec3 = points
+            .iter()
+            .map(|p| (*p - center).normalize_or_zero())
+            .sum();
+        turned(&own, sum.normalize_or(z))
+    };
+    let local =
+        |frame: &Frame| -> Vec<DVec3> { points.iter().map(|p| frame.of(*p - center)).collect() };
+    let seen = local(&axis);
+    let narrow = seen
+        .iter()
+        .all(|v| v.z > 0.0 && v.x.abs().max(v.y.abs()) <= WIDEST * v.z);
+    let one_view = narrow || (flat && options.projection != Projection::Centered);
+    if one_view {
+        return local_view(light, axis, &seen, casters, options, f64::INFINITY)
+            .into_iter()
+            .collect();
+    }
+    let faces = [
+        own.forward,
+        own.right,
+        -own.right,
+        own.up,
+        -own.up,
+        -own.forward,
+    ];
+    faces
+        .iter()
+        .take(if flat { 5 } else { 6 })
+        .filter_map(|forward| {
+            let frame = turned(&own, *forward);
+            // Hulls that may show within the face.
+            let hulls = receivers.iter().map(|hull| {
+                let hull: Vec<DVec3> = hull.iter().map(|p| frame.of(*p - center)).collect();
+                clip_to_face(&hull)
+            });
+            let seen: Vec<DVec3> = hulls.flatten().collect();
+            let centered = OcclusionOptions {
+                projection: Projection::Centered,
+                ..*options
+            };
+            local_view(light, frame, &seen, casters, &centered, FACE)
+        })
+        .collect()
+}
+
+/// A frame whose forward axis is given, with axes across it that follow another frame's.
+fn turned(frame: &Frame, forward: DVec3) -> Frame {
+    let hint = if forward.dot(frame.right).abs() < 0.8 {
+        frame.right
+    } else {
+        frame.up
+    };
+    let right = (hint - forward * hint.dot(forward)).normalize_or(forward.any_orthonormal_vector());
+    Frame {
+        right,
+        up: forward.cross(right),
+        forward,
+    }
+}
+
+/// Points around the part of a hull, given in a face's own frame, that lies within the face.
+fn clip_to_face(hull: &[DVec3]) -> Vec<DVec3> {
+    let planes = [
+        DVec3::new(1.0, 0.0, 1.0),
+        DVec3::new(-1.0, 0.0, 1.0),
+        DVec3::new(0.0, 1.0, 1.0),
+        DVec3::new(0.0, -1.0, 1.0),
+        DVec3::Z,
+    ];
+    let beyond = |plane: &DVec3| hull.iter().all(|v| v.dot(*plane) < 0.0);
+    if planes.iter().any(beyond) {
+        return Vec::new();
+    }
+    let far = hull.iter().map(|v| v.z).fold(0.0, f64::max);
+    let within = |v: &&DVec3| v.z > 0.0 && v.x.abs().max(v.y.abs()) <= v.z;
+    if hull.iter().filter(within).count() == hull.len() {
+        return hull.to_vec();
+    }
+    // The box of it, cut to the face's pyramid.
+    let fold = |pick: fn(&DVec3) -> f64| {
+        hull.iter()
+            .map(pick)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                (a.min(v), b.max(v))
+            })
+    };
+    let ((x0, x1), (y0, y1)) = (fold(|v| v.x), fold(|v| v.y));
+    let near = hull.iter().map(|v| v.z).fold(f64::INFINITY, f64::min);
+    let near = near.max(1.0e-3 * far);
+    let mut points = Vec::new();
+    for z in [near, far] {
+        for x in [x0, x1] {
+            for y in [y0, y1] {
+                points.push(DVec3::new(x.clamp(-z, z), y.clamp(-z, z), z));
+            }
+        }
+    }
+    points
+}
+
+fn sun_view(
+    light: &AreaLight,
+    frame: Frame,
+    points: &[DVec3],
+    casters: &[Aabb],
+    options: &OcclusionOptions,
+) -> SlicedView {
+    let LightShape::Sun { angular_diameter } = light.shape else {
+        unreachable!("only suns come here");
+    };
+    let tan = f64::from((0.5 * angular_diameter).tan());
+    let seen: Vec<DVec3> = points.iter().map(|p| frame.of(*p)).collect();
+    let far = seen.iter().map(|v| v.z).fold(f64::NEG_INFINITY, f64::max);
+    let boxes = local_boxes(casters, |p| frame.of(p));
+    let nearest = |limit: ([f64; 2], [f64; 2])| {
+        let within = boxes.iter().filter(|(low, high)| {
+            low.x <= limit.1[0]
+                && high.x >= limit.0[0]
+                && low.y <= limit.1[1]
+                && high.y >= limit.0[1]
+        });
+        within.map(|(low, _)| low.z).fold(f64::INFINITY, f64::min)
+    };
+    let (low, high) = bounds(seen.iter().map(|v| [v.x, v.y]));
+    let everywhere = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
+    let margin = tan * (far - nearest(everywhere)).max(0.0);
+    let (low, high) = widened(low, high, margin);
+    let near = nearest((low, high)).min(far);
+    let half = [tan as f32, tan as f32, 0.0, 0.0];
+    let params = OcclusionView {
+        half_x: half,
+        half_y: half,
+        ..OcclusionView::default()
+    };
+    let kernel = (2.0 * tan * (far - near)).powi(2);
+    let extent = Extent {
+        behind: None,
+        low,
+        high,
+        near,
+        far,
+        local: false,
+        kernel,
+        slope: f64::INFINITY,
+    };
+    finish(params, frame, DVec3::ZERO, &extent, options)
+}
+
+/// A view from behind a light, of receivers given in its frame.
+fn local_view(
+    light: &AreaLight,
+    frame: Frame,
+    receivers: &[DVec3],
+    casters: &[Aabb],
+    options: &OcclusionOptions,
+    slope: f64,
+) -> Option<SlicedView> {
+    let center = light.center.as_dvec3();
+    let far = receivers.iter().map(|v| v.z).fold(0.0, f64::max);
+    if far <= 0.0 {
+        return None;
+    }
+    let [axis_x, axis_y] = [light.axis_x, light.axis_y].map(|v| v.as_dvec3());
+    let (half_x, half_y) = match light.shape {
+        LightShape::Rect { width, height } => (
+            frame.of(axis_x * (0.5 * f64::from(width))),
+            frame.of(axis_y * (0.5 * f64::from(height))),
+        ),
+        LightShape::Disk { radius } => (
+            frame.of(axis_x * f64::from(radius)),
+            frame.of(axis_y * f64::from(radius)),
+        ),
+        _ => {
+            let radius = f64::from(light.shape.bounding_radius());
+            (DVec3::X * radius, DVec3::Y * radius)
+        }
+    };
+    let reach = half_x.length().max(half_y.length());
+    let boxes = local_boxes(casters, |p| frame.of(p - center));
+    let in_front = boxes
+        .iter()
+        .filter(|(low, high)| high.z > 0.0 && low.z < far);
+    let nearest = in_front.map(|(low, _)| low.z).fold(far, f64::min);
+    let near = nearest
+        .max(NEAREST * far)
+        .max((0.25 * reach).min(0.25 * far));
+    let behind = match options.projection {
+        Projection::Orthographic => None,
+        Projection::Centered => Some(0.0),
+        Projection::Offset => {
+            let corners = boxes.iter().flat_map(|(low, high)| {
+                let z = low.z.max(near);
+                let x = low.x.abs().max(high.x.abs());
+                let y = low.y.abs().max(high.y.abs());
+                (high.z > near).then_some([x, y, z])
+            });
+            let [wide, high] = [
+                half_x.x.abs().max(half_y.x.abs()),
+                half_x.y.abs().max(half_y.y.abs()),
+            ];
+            offset_of(corners, wide.max(1.0e-6), high.max(1.0e-6), far)
+        }
+    };
+    let project = |v: DVec3| -> [f64; 2] {
+        match behind {
+            Some(d) => [v.x / (v.z + d), v.y / (v.z + d)],
+            None => [v.x, v.y],
+        }
+    };
+    let inverse = |z: f64| behind.map_or(1.0, |d| 1.0 / (z + d));
+    // What kernels look at: from the receiver's own place to that of the line to the light's centre
+    // on the nearest plane.
+    let looks = receivers.iter().filter(|v| v.z > near).flat_map(|v| {
+        let at_near = [v.x, v.y].map(|c| c * near / v.z * inverse(near));
+        [project(*v), at_near]
+    });
+    let looks: Vec<[f64; 2]> = looks.collect();
+    if looks.is_empty() {
+        return None;
+    }
+    let (low, high) = bounds(looks.into_iter());
+    let widest = (0..2).map(|i| high[i] - low[i]).fold(0.0, f64::max);
+    let margin = (reach * (1.0 - near / far) * inverse(near)).min(MOST_REACH * widest);
+    let (mut low, mut high) = widened(low, high, margin);
+    // Nothing outside of the casters' own extent blocks.
+    let bound = boxes
+        .iter()
+        .filter(|(a, b)| b.z > 0.0 && a.z < far)
+        .map(|(a, b)| {
+            if a.z <= 0.0 && behind.is_some() {
+                return ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
+            }
+            let z = [a.z, b.z];
+            let all = (0..8).map(|i| {
+                project(DVec3::new(
+                    if i & 1 == 0 { a.x } else { b.x },
+                    if i & 2 == 0 { a.y } else { b.y },
+                    z[i >> 2],
+                ))
+            });
+            bounds(all)
+        });
+    let casters = bound.reduce(|(a, b), (c, d)| {
+        (
+            [a[0].min(c[0]), a[1].min(c[1])],
+            [b[0].max(d[0]), b[1].max(d[1])],
+        )
+    })?;
+    let (casters_low, casters_high) = widened(casters.0, casters.1, 0.0);
+    for axis in 0..2 {
+        let (a, b) = (
+            low[axis].max(casters_low[axis]),
+            high[axis].min(casters_high[axis]),
+        );
+        if a < b {
+            (low[axis], high[axis]) = (a, b);
+        }
+    }
+    let kernel = 4.0 * (1.5 * reach * (1.0 - near / far) * inverse(near)).powi(2);
+    let row = |v: DVec3| v.as_vec3().extend(0.0).to_array();
+    let params = OcclusionView {
+        half_x: row(half_x),
+        half_y: row(half_y),
+        ..OcclusionView::default()
+    };
+    let extent = Extent {
+        behind,
+        low,
+        high,
+        near,
+        far,
+        local: true,
+        kernel,
+        slope,
+    };
+    Some(finish(params, frame, center, &extent, options))
+}
+
+/// Distance of the centre of projection behind a light of these half extents, so that the frustum
+/// through the light's border holds all points: the least of z / (|x| / half - 1). `None` where no
+/// point is beside the light: an orthographic view. Kept so large that the view stays narrow enough
+/// to have useful texels everywhere.
+fn offset_of(
+    points: impl Iterator<Item = [f64; 3]> + Clone,
+    half_width: f64,
+    half_height: f64,
+    far: f64,
+) -> Option<f64> {
+    let fits = points.clone().flat_map(|[x, y, z]| {
+        [(x, half_width), (y, half_height)]
+            .into_iter()
+            .filter(|(c, half)| c > half)
+            .map(move |(c, half)| z / (c / half - 1.0))
+    });
+    let fit = fits.reduce(f64::min)?;
+    let narrow = points.map(|[x, y, z]| x.max(y) / WIDEST - z);
+    let least = narrow.fold(0.0, f64::max).min(far);
+    (fit < 1.0e3 * far).then_some(fit.max(least))
+}
+
+fn local_boxes(casters: &[Aabb], of: impl Fn(DVec3) -> DVec3) -> Vec<(DVec3, DVec3)> {
+    let solid = casters.iter().filter(|bounds| !bounds.is_empty());
+    solid
+        .map(|bounds| {
+            let corners = bounds.corners().map(|corner| of(corner.as_dvec3()));
+            let low = corners.iter().fold(DVec3::INFINITY, |a, c| a.min(*c));
+            let high = corners.iter().fold(DVec3::NEG_INFINITY, |a, c| a.max(*c));
+            (low, high)
+        })
+        .collect()
+}
+
+fn bounds(points: impl Iterator<Item = [f64; 2]>) -> ([f64; 2], [f64; 2]) {
+    points.fold(
+        ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]),
+        |(low, high), p| {
+            (
+                [low[0].min(p[0]), low[1].min(p[1])],
+                [high[0].max(p[0]), high[1].max(p[1])],
+            )
+        },
+    )
+}
+
+fn widened(low: [f64; 2], high: [f64; 2], margin: f64) -> ([f64; 2], [f64; 2]) {
+    let widest = (high[0] - low[0]).max(high[1] - low[1]).max(1.0e-6);
+    let (mut low, mut high) = (low, high);
+    for axis in 0..2 {
+        let width = (high[axis] - low[axis]).max(1.0e-3 * widest);
+        high[axis] = low[axis] + width + MARGIN * width + margin;
+        low[axis] -= MARGIN * width + margin;
+    }
+    (low, high)
+}
+
+/// What a view looks at.
+struct Extent {
+    /// Distance of the centre of projection behind the light's centre; `None`: orthographic.
+    behind: Option<f64>,
+    /// Image coordinates.
+    low: [f64; 2],
+    high: [f64; 2],
+    /// Slice planes, metres.
+    near: f64,
+    far: f64,
+    /// Whether penumbrae narrow evenly in 1 / depth, not in depth.
+    local: bool,
+    /// Largest kernel, in image coordinates squared.
+    kernel: f64,
+    /// Largest slope of receivers.
+    slope: f64,
+}
+
+fn finish(
+    params: OcclusionView,
+    frame: Frame,
+    origin: DVec3,
+    extent: &Extent,
+    options: &OcclusionOptions,
+) -> SlicedView {
+    let Extent {
+        behind,
+        low,
+        high,
+        near,
+        ..
+    } = *extent;
+    let width = (extent.far - near)
+        .max(1.0e-6 * extent.far.abs())
+        .max(1.0e-6);
+    let far = near + width * (1.0 + 1.0e-4);
+    let by_inverse = match options.planes {
+        Planes::Reciprocal if extent.local => 1.0,
+        Planes::Blend if extent.local => 0.5,
+        _ => 0.0,
+    };
+    let scale = [0, 1].map(|i| 1.0 / (high[i] - low[i]));
+    let row = |axis: DVec3, w: f64| axis.as_vec3().extend(w as f32).to_array();
+    let params = OcclusionView {
+        right: row(frame.right, low[0]),
+        up: row(frame.up, low[1]),
+        forward: row(frame.forward, behind.unwrap_or(0.0)),
+        scale: [
+            scale[0] as f32,
+            scale[1] as f32,
+            f32::from(u8::from(behind.is_some())),
+            extent.slope.min(f64::from(f32::MAX)) as f32,
+        ],
+        range: [near as f32, far as f32, by_inverse as f32, 0.0],
+        ..params
+    };
+    let fine = options.fine_slices();
+    let planes = (0..=fine)
+        .map(|i| plane_depth(near, far, by_inverse, f64::from(i) / f64::from(fine)) as f32);
+    let plane = |axis: DVec3| axis.extend(-axis.dot(origin));
+    let z = plane(frame.forward);
+    let one = behind.map_or(DVec4::W, |d| z + DVec4::W * d);
+    let clip = |axis: DVec3, i: usize| (plane(axis) - one * low[i]) * (2.0 * scale[i]) - one;
+    // Depth is not used but to drop what is behind a light: 0 there.
+    let clip_z = match behind {
+        Some(_) => z - DVec4::W * (1.0e-5 * far),
+        None => {
+            let from = if extent.local { 0.0 } else { near - width };
+            (z - DVec4::W * from) * (1.0 / (far + width - from))
+        }
+    };
+    let rows = DMat4::from_cols(clip(frame.right, 0), clip(frame.up, 1), clip_z, one);
+    SlicedView {
+        params,
+        clip_from_scene: rows.transpose().as_mat4(),
+        depth: z.as_vec4().to_array(),
+        planes: planes.collect(),
+        most_kernel: (extent.kernel * scale[0] * scale[1]).min(1.0),
+    }
+}
+
+/// Inverse of `slice_place` in `occlusion_textures/params.glsl`: the depth of a place.
+fn plane_depth(near: f64, far: f64, by_inverse: f64, place: f64) -> f64 {
+    // place = l (1 - b) + b l far / z with l = (z - near) / (far - near): a quadratic in z.
+    let b = by_inverse;
+    if b <= 0.0 {
+        return near + place * (far - near);
+    }
+    // (1-b) z^2 + z (b far - (1-b) near - place (far - near)) - b far near = 0
+    let quadratic = 1.0 - b;
+    let linear = b * far - quadratic * near - place * (far - near);
+    let constant = -b * far * near;
+    if quadratic == 0.0 {
+        return -constant / linear;
+    }
+    let root = (linear * linear - 4.0 * quadratic * constant).sqrt();
+    if linear > 0.0 {
+        -2.0 * constant / (linear + root)
+    } else {
+        (root - linear) / (2.0 * quadratic)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Vec3, Vec4};
+
+    fn light(shape: LightShape) -> AreaLight {
+        AreaLight::new(shape, Vec3::new(1.0, 10.0, 2.0), Vec3::NEG_Y, Vec3::X)
+    }
+
+    fn cube(center: Vec3, half: f32) -> Aabb {
+        Aabb {
+            min: center - Vec3::splat(half),
+            max: center + Vec3::splat(half),
+        }
+    }
+
+    fn views_of(shape: LightShape, boxes: &[Aabb], options: &OcclusionOptions) -> Vec<SlicedView> {
+        let hulls: Vec<Vec<DVec3>> = boxes
+            .iter()
+            .map(|b| b.corners().map(|c| c.as_dvec3()).to_vec())
+            .collect();
+        sliced_views(&light(shape), &hulls, boxes, options)
+    }
+
+    const RECT: LightShape = LightShape::Rect {
+        width: 2.0,
+        height: 1.0,
+    };
+
+    #[test]
+    fn planes_invert_the_place_of_a_depth() {
+        for by_inverse in [0.0, 0.5, 1.0] {
+            let (near, far) = (0.7, 31.0);
+            for i in 0..=20 {
+                let place = f64::from(i) / 20.0;
+                let z = plane_depth(near, far, by_inverse, place);
+                let linear = (z - near) / (far - near);
+                let back = (1.0 - by_inverse) * linear + by_inverse * linear * far / z;
+                assert!((back - place).abs() < 1.0e-9, "{by_inverse} {place}: {z}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_offset_is_the_least_that_the_lights_border_allows() {
+        // z / (|x| / half - 1): 6 / (3 / 1 - 1) and 8 / (2 / 0.5 - 1).
+        let points = [[3.0, 0.2, 6.0], [0.5, 2.0, 8.0], [0.9, 0.4, 1.0]];
+        let d = offset_of(points.into_iter(), 1.0, 0.5, 10.0);
+        assert_eq!(d, Some(8.0 / 3.0));
+        // No point beside the light.
+        let inside = [[0.9, 0.4, 1.0]];
+        assert_eq!(offset_of(inside.into_iter(), 1.0, 0.5, 10.0), None);
+    }
+
+    #[test]
+    fn matrices_draw_where_shaders_look() {
+        let boxes = [cube(Vec3::ZERO, 1.0), cube(Vec3::new(3.0, 2.0, 1.0), 0.5)];
+        for projection in [
+            Projection::Centered,
+            Projection::Offset,
+            Projection::Orthographic,
+        ] {
+            let options = OcclusionOptions {
+                projection,
+                ..OcclusionOptions::DEFAULT
+            };
+            let sun = LightShape::Sun {
+                angular_diameter: 0.02,
+            };
+            for shape in [RECT, LightShape::Disk { radius: 0.3 }, sun] {
+                let views = views_of(shape, &boxes, &options);
+                assert_eq!(views.len(), 1, "{shape:?}");
+                let view = &views[0];
+                let origin = if shape.is_sun() {
+                    Vec3::ZERO
+                } else {
+                    light(shape).center
+                };
+                for corner in boxes.iter().flat_map(|b| b.corners()) {
+                    let q = corner - origin;
+                    let dot = |row: [f32; 4]| Vec3::new(row[0], row[1], row[2]).dot(q);
+                    let p = &view.params;
+                    let z = dot(p.forward);
+                    let over = if p.scale[2] > 0.0 {
+                        z + p.forward[3]
+                    } else {
+                        1.0
+                    };
+                    let x = (dot(p.right) / over - p.right[3]) * p.scale[0];
+                    let y = (dot(p.up) / over - p.up[3]) * p.scale[1];
+                    let clip = view.clip_from_scene * Vec4::from((corner, 1.0));
+                    let ndc = clip.truncate() / clip.w;
+                    assert!(
+                        (0.5 * ndc.x + 0.5 - x).abs() < 1.0e-5,
+                        "{shape:?} {projection:?}"
+                    );
+                    assert!(
+                        (0.5 * ndc.y + 0.5 - y).abs() < 1.0e-5,
+                        "{shape:?} {projection:?}"
+                    );
+                    assert!(
+                        ndc.z > 0.0 && ndc.z < 1.0,
+                        "{shape:?} {projection:?}: {ndc}"
+                    );
+                    let depth = Vec4::from(view.depth).dot(Vec4::from((corner, 1.0)));
+                    assert!((depth - z).abs() < 1.0e-4);
+                    assert!(depth <= view.planes[view.planes.len() - 1]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_lamp_in_a_room_looks_through_the_faces_of_a_cube() {
+        let room = [cube(Vec3::new(1.0, 10.0, 2.0), 3.0)];
+        let sphere = LightShape::Sphere { radius: 0.1 };
+        assert_eq!(views_of(sphere, &room, &OcclusionOptions::DEFAULT).len(), 6);
+        // A rectangle sends nothing backwards; from behind, one view sees all that it lights.
+        assert_eq!(views_of(RECT, &room, &OcclusionOptions::DEFAULT).len(), 5);
+        let offset = OcclusionOptions {
+            projection: Projection::Offset,
+            ..OcclusionOptions::DEFAULT
+        };
+        assert_eq!(views_of(RECT, &room, &offset).len(), 1);
+        assert!(views_of(RECT, &[], &offset).is_empty());
+    }
+}

@@ -1,0 +1,413 @@
+//! `occlusion-textures` against closed forms and brute force: filters, combinations, slices and what
+//! they are allowed to be wrong by.
+
+mod support;
+
+use antumbra::capture::{CapturedFrame, FrameRenderer, FrameRequest, Samples};
+use antumbra::light::{AreaLight, LightShape};
+use antumbra::scene::{Aabb, Material, Primitive, Scene, SceneCamera, SceneLight};
+use glam::Vec3;
+
+/// Height of the light above the floor, metres; the light is a square of 2 m over the origin.
+const HEIGHT: f32 = 10.0;
+const SIZE: u32 = 64;
+
+fn quad(name: &str, corners: [Vec3; 4]) -> Primitive {
+    Primitive {
+        name: name.to_string(),
+        normals: vec![Vec3::Y; 4],
+        positions: corners.to_vec(),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Primitive::default()
+    }
+}
+
+/// A level rectangle at a depth below the light.
+fn plate(name: &str, x: [f32; 2], z: [f32; 2], depth: f32) -> Primitive {
+    let corner = |x, z| Vec3::new(x, HEIGHT - depth, z);
+    let corners = [
+        corner(x[0], z[0]),
+        corner(x[0], z[1]),
+        corner(x[1], z[1]),
+        corner(x[1], z[0]),
+    ];
+    quad(name, corners)
+}
+
+fn floor() -> Primitive {
+    plate("floor", [-30.0, 30.0], [-30.0, 30.0], HEIGHT)
+}
+
+fn square(half: f32) -> LightShape {
+    LightShape::Rect {
+        width: 2.0 * half,
+        height: 2.0 * half,
+    }
+}
+
+fn scene(primitives: Vec<Primitive>, shape: LightShape) -> Scene {
+    let center = Vec3::new(0.0, HEIGHT, 0.0);
+    let mut scene = Scene {
+        name: "closed form".to_string(),
+        primitives,
+        materials: vec![Material::default()],
+        lights: vec![SceneLight {
+            name: "lamp".to_string(),
+            node: None,
+            light: AreaLight::new(shape, center, Vec3::NEG_Y, Vec3::X),
+        }],
+        ..Scene::default()
+    };
+    scene.finish().unwrap();
+    scene
+}
+
+/// Looks down from 2 m above the floor and sees 1.6 m to each side: +X to the right.
+fn camera() -> SceneCamera {
+    SceneCamera {
+        position: Vec3::new(0.0, 2.0, 0.0),
+        forward: Vec3::NEG_Y,
+        right: Vec3::X,
+        up: Vec3::NEG_Z,
+        yfov: 2.0 * 0.8_f32.atan(),
+        znear: 0.01,
+        ..SceneCamera::framing(&Aabb::EMPTY)
+    }
+}
+
+/// Where a pixel's column lies on the floor.
+fn floor_x(column: u32) -> f32 {
+    1.6 * ((column as f32 + 0.5) / (SIZE / 2) as f32 - 1.0)
+}
+
+fn request(camera: &SceneCamera, size: [u32; 2], options: &str) -> FrameRequest {
+    FrameRequest {
+        camera: camera.clone(),
+        size,
+        lights: vec![0],
+        technique: format!("occlusion-textures:{options}").parse().unwrap(),
+    }
+}
+
+fn render(scene: &Scene, options: &[&str]) -> Vec<Vec<f32>> {
+    let mut renderer = FrameRenderer::new(support::gpu(), scene).unwrap();
+    let images = options.iter().map(|options| {
+        let frame = renderer.render(&request(&camera(), [SIZE; 2], options));
+        frame.unwrap().lights.remove(0).visibility
+    });
+    let images: Vec<Vec<f32>> = images.collect();
+    support::assert_no_messages(&renderer.destroy().unwrap());
+    images
+}
+
+/// Largest error against the half-plane x <= 0 at a depth: linear across the light of half width 1.
+fn half_plane_error(image: &[f32], depth: f32) -> f32 {
+    let half_width = (HEIGHT - depth) / depth;
+    let errors = image.iter().enumerate().map(|(i, v)| {
+        let x = floor_x(i as u32 % SIZE);
+        let truth = (0.5 + 0.5 * x / half_width).clamp(0.0, 1.0);
+        (v - truth).abs()
+    });
+    errors.fold(0.0, f32::max)
+}
+
+/// Slices of a third of 10 m, from a plate far to the side on: planes at 3.33, 5, 6.67, .. metres.
+fn half_plane_in_slices(depth: f32) -> Scene {
+    let near = 10.0 / 3.0;
+    scene(
+        vec![
+            floor(),
+            plate("blocker", [-30.0, 0.0], [-30.0, 30.0], depth),
+            plate("far aside", [8.0, 8.1], [0.0, 0.1], near),
+        ],
+        square(1.0),
+    )
+}
+
+const IN_SLICES: &str = "slices=4,fit=range,planes=uniform,depth=lower,contact=0";
+
+#[test]
+fn a_half_plane_on_a_slice_plane_is_exact_to_a_texel() {
+    let _one = support::serial();
+    let scene = half_plane_in_slices(4.9995);
+    let sat = format!("{IN_SLICES},filter=sat");
+    let linear = format!("{IN_SLICES},filter=nbuffers");
+    let log = format!("{IN_SLICES},filter=nbuffers-log");
+    let images = render(&scene, &[&sat, &linear, &log]);
+    let errors: Vec<f32> = images.iter().map(|i| half_plane_error(i, 5.0)).collect();
+    println!("sat, N-buffers linear, log: {errors:?}");
+    // Kernels are 0.2 wide in an image at most 1 wide, of 256 texels.
+    let half_texel = 0.5 / (0.2 * 256.0);
+    assert!(errors[0] <= 0.003 + half_texel, "tables: {}", errors[0]);
+    assert!(errors[1] <= 0.07 + half_texel, "N-buffers: {}", errors[1]);
+    assert!(
+        errors[2] <= 0.08 + half_texel,
+        "N-buffers, log: {}",
+        errors[2]
+    );
+}
+
+#[test]
+fn a_half_plane_inside_a_slice_is_as_wrong_as_its_rounding() {
+    let _one = support::serial();
+    let scene = half_plane_in_slices(4.0);
+    let image = &render(&scene, &[IN_SLICES])[0];
+    let error = half_plane_error(image, 4.0);
+    // Penumbrae of the lower plane instead of the edge's own: half of 1 - w(b) / w(h).
+    let width = |z: f32| 1.0 / z - 1.0 / HEIGHT;
+    let rounding = 0.5 * (1.0 - width(5.0) / width(4.0));
+    println!("{error} of {rounding}");
+    assert!(error <= rounding + 0.01, "{error} > {rounding}");
+    assert!(
+        error >= rounding - 0.03,
+        "{error}: the slices are not where they should be"
+    );
+    // Slices spent where something is come much closer.
+    let fitted = half_plane_error(&render(&scene, &[""])[0], 4.0);
+    println!("fitted to what is there: {fitted}");
+    assert!(fitted <= 0.25 * rounding, "{fitted}");
+}
+
+fn words(frame: &CapturedFrame, name: &str) -> Vec<u32> {
+    let image = frame
+        .images
+        .iter()
+        .find(|image| image.name == name)
+        .unwrap();
+    match &image.planes[0] {
+        Samples::Uint(words) => words.clone(),
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+#[test]
+fn tables_are_the_sums_of_their_texels() {
+    let _one = support::serial();
+    let tilted = [
+        Vec3::new(-0.7, 3.0, -0.5),
+        Vec3::new(-0.3, 5.0, 0.6),
+        Vec3::new(0.5, 6.5, 0.7),
+        Vec3::new(0.4, 4.0, -0.6),
+    ];
+    let mut primitives = vec![floor(), quad("tilted", tilted)];
+    for i in 0..20 {
+        let x = -1.0 + 0.1 * i as f32;
+        primitives.push(plate(
+            "bar",
+            [x, x + 0.03],
+            [-1.0, 1.0],
+            3.0 + 0.2 * i as f32,
+        ));
+    }
+    let scene = scene(primitives, square(1.0));
+    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
+    // With few fine slices the groups are the slices, in order.
+    let request = request(
+        &camera(),
+        [SIZE; 2],
+        "slices=8,fit=range,resolution=128,detail=2",
+    );
+    let names = [
+        "occlusion-textures.bits 0:lamp.0[0]",
+        "occlusion-textures.tables 0:lamp.0[0]",
+        "occlusion-textures.tables 0:lamp.0[1]",
+        "occlusion-textures.tables 0:lamp.0[2]",
+    ];
+    let frame = renderer.render_with_images(&request, &names).unwrap();
+    support::assert_no_messages(&renderer.destroy().unwrap());
+    let bits = words(&frame, names[0]);
+    let occupied: Vec<u32> = (0..8)
+        .filter(|slice| bits.iter().any(|b| b >> slice & 1 == 1))
+        .collect();
+    assert!(occupied.len() >= 4, "{occupied:?}");
+    let side = 64;
+    for (layer, name) in names[1..].iter().enumerate() {
+        let table = words(&frame, name);
+        let own = 1_u32 << occupied[layer];
+        let nearer = occupied[..=layer]
+            .iter()
+            .fold(0, |mask, slice| mask | 1_u32 << slice);
+        let mut marked = 0;
+        for y in 0..=side {
+            for x in 0..=side {
+                let count = |mask: u32| {
+                    let row = |v: usize| &bits[128 * v..128 * v + 2 * x];
+                    let hits = (0..2 * y).flat_map(row).filter(|b| *b & mask != 0);
+                    hits.count() as u32
+                };
+                // All rows of the table would take long; every seventh and the borders do.
+                if y % 7 != 1 && y != side && y != 0 {
+                    continue;
+                }
+                let expected = count(own).wrapping_add(count(nearer) << 16);
+                assert_eq!(table[y * (side + 1) + x], expected, "{name} at {x}, {y}");
+                marked = marked.max(count(own));
+            }
+        }
+        assert!(marked > 0, "{name} holds nothing");
+    }
+}
+
+#[test]
+fn nothing_is_full_light_and_a_cover_is_none() {
+    let _one = support::serial();
+    let options = [
+        "",
+        "filter=nbuffers",
+        "filter=mipmaps",
+        "projection=offset",
+        "fit=range",
+    ];
+    for image in render(&scene(vec![floor()], square(1.0)), &options) {
+        assert!(image.iter().all(|v| *v == 1.0));
+    }
+    let cover = plate("cover", [-20.0, 20.0], [-20.0, 20.0], 5.0);
+    let covered = scene(vec![floor(), cover], square(1.0));
+    for combine in ["cumulative", "product", "sum", "maximum", "thin"] {
+        // Tables only: N-buffers know no border and let light in around the image's.
+        let image = &render(&covered, &[&format!("combine={combine}")])[0];
+        let most = image.iter().copied().fold(0.0, f32::max);
+        assert!(most == 0.0, "{combine}: {most}");
+    }
+}
+
+/// Kernels that reached out of the image would let light in around a cover that ends where the
+/// image does.
+#[test]
+fn kernels_stay_within_the_image() {
+    let _one = support::serial();
+    // As wide as what the floor in view can see of the light at that depth, and a texel more.
+    let half = 0.5 * (1.6 + 1.0) * 1.02;
+    let cover = plate("cover", [-half, half], [-half, half], 5.0);
+    let scene = scene(vec![floor(), cover], square(1.0));
+    let options = ["", "projection=offset", "projection=orthographic"];
+    for (image, options) in render(&scene, &options).iter().zip(options) {
+        let most = image.iter().copied().fold(0.0, f32::max);
+        assert!(most <= 0.01, "{options}: {most}");
+    }
+}
+
+#[test]
+fn a_receiver_that_passes_slice_planes_sees_no_step() {
+    let _one = support::serial();
+    // A ramp that falls by 3 m along the picture, below an edge that runs along it.
+    let ramp = [
+        Vec3::new(-30.0, 3.0, -1.5),
+        Vec3::new(-30.0, 0.0, 1.5),
+        Vec3::new(30.0, 0.0, 1.5),
+        Vec3::new(30.0, 3.0, -1.5),
+    ];
+    let blocker = plate("blocker", [-30.0, 0.0], [-30.0, 30.0], 4.0);
+    let scene = scene(vec![quad("ramp", ramp), blocker], square(1.0));
+    let above = SceneCamera {
+        position: Vec3::new(0.25, 5.5, 0.0),
+        forward: Vec3::NEG_Y,
+        right: Vec3::Z,
+        up: Vec3::X,
+        yfov: 1.0e-3,
+        znear: 0.01,
+        ..SceneCamera::framing(&Aabb::EMPTY)
+    };
+    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
+    let options = "resolution=1024";
+    // One row of 1000 pixels, less than 3 mm apart.
+    let frame = renderer
+        .render(&request(&above, [1000, 2], options))
+        .unwrap();
+    support::assert_no_messages(&renderer.destroy().unwrap());
+    let row = &frame.lights[0].visibility[..1000];
+    let step = row
+        .windows(2)
+        .map(|w| (w[0] - w[1]).abs())
+        .fold(0.0, f32::max);
+    let range = row
+        .iter()
+        .fold((1.0_f32, 0.0_f32), |(a, b), v| (a.min(*v), b.max(*v)));
+    println!("largest step {step}, values {range:?}");
+    assert!(
+        range.0 > 0.3 && range.1 < 0.95,
+        "{range:?}: the row lies in the penumbra"
+    );
+    assert!(step <= 0.005, "{step}");
+}
+
+#[test]
+fn a_tilted_sheet_does_not_leak() {
+    let _one = support::serial();
+    let sheet = [
+        Vec3::new(-20.0, 3.0, -4.0),
+        Vec3::new(20.0, 3.0, -4.0),
+        Vec3::new(20.0, 7.5, 4.0),
+        Vec3::new(-20.0, 7.5, 4.0),
+    ];
+    let scene = scene(vec![floor(), quad("sheet", sheet)], square(1.0));
+    let images = render(
+        &scene,
+        &[
+            "",
+            "combine=product",
+            "fit=range,depth=lower",
+            "fit=range,depth=lower,combine=product",
+        ],
+    );
+    let most = |image: &Vec<f32>| image.iter().copied().fold(0.0, f32::max);
+    println!("{:?}", images.iter().map(most).collect::<Vec<_>>());
+    assert!(most(&images[0]) <= 0.05, "{}", most(&images[0]));
+    // Slices over the whole range are coarser and leak more, but less than by the product.
+    assert!(most(&images[2]) < most(&images[3]));
+    assert!(
+        most(&images[1]) > 0.1,
+        "the published product leaks: {}",
+        most(&images[1])
+    );
+}
+
+#[test]
+fn a_larger_light_costs_no_more() {
+    let _one = support::serial();
+    // Blockers everywhere, so that every kernel has something in it.
+    let mut primitives = vec![floor()];
+    for (row, depth) in [3.0_f32, 5.0, 7.0].into_iter().enumerate() {
+        for i in -60..60 {
+            let x = 0.5 * i as f32 + 0.1 * row as f32;
+            primitives.push(plate("bar", [x, x + 0.05], [-20.0, 20.0], depth));
+        }
+    }
+    let fetches = |half: f32| -> Vec<f32> {
+        let scene = scene(primitives.clone(), square(half));
+        render(&scene, &["show=fetches"]).remove(0)
+    };
+    let once = fetches(1.0);
+    assert!(once.iter().all(|v| *v > 0.0));
+    for half in [2.0, 4.0] {
+        assert!(once == fetches(half), "half width {half}");
+    }
+}
+
+#[test]
+fn every_option_renders_the_same_twice_without_a_message() {
+    let _one = support::serial();
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/foliage.glb");
+    let scene = Scene::load(&path, &Default::default()).unwrap();
+    let camera = scene.select_camera(None).unwrap();
+    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
+    for options in [
+        "",
+        "slices=4,planes=uniform,fit=range",
+        "slices=128,planes=reciprocal,contact=0",
+        "combine=thin,filter=nbuffers-log,resolution=256",
+        "filter=mipmaps,detail=1,resolution=128",
+    ] {
+        let request = request(&camera, [96, 96], options);
+        let first = renderer.render(&request).unwrap();
+        let second = renderer.render(&request).unwrap();
+        let values = &first.lights[0].visibility;
+        assert!(*values == second.lights[0].visibility, "{options}");
+        assert!(values.iter().all(|v| (0.0..=1.0).contains(v)), "{options}");
+        assert!(
+            values.iter().any(|v| *v < 0.3) && values.iter().any(|v| *v > 0.7),
+            "{options}"
+        );
+    }
+    support::assert_no_messages(&renderer.destroy().unwrap());
+}

@@ -56,6 +56,8 @@ pub mod light;
 #[cfg(feature = "cli")]
 pub mod measure;
 #[cfg(feature = "cli")]
+mod message;
+#[cfg(feature = "cli")]
 pub mod reference;
 pub mod renderer;
 #[cfg(feature = "cli")]

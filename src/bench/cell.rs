@@ -13,6 +13,7 @@ use super::rival::{Rival, View};
 use crate::capture::{CapturedFrame, FrameRenderer, FrameRequest};
 use crate::gpu::{DeviceInfo, Gpu, GpuOptions};
 use crate::light::AreaLight;
+use crate::message::{line, one_line};
 use crate::scene::{Scene, SceneCamera};
 
 /// Frames before the measured ones.
@@ -211,30 +212,8 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
     text.unwrap_or("without a message")
 }
 
-/// Line breaks and other control characters become spaces.
-pub(super) fn one_line(text: &str) -> String {
-    let words = text.split(|c: char| c.is_control() || c == ' ');
-    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
-    words.join(" ")
-}
-
 fn milliseconds(since: Instant) -> f64 {
     rounded(since.elapsed().as_secs_f64() * 1e3)
-}
-
-/// The text with those of its sources that it does not quote itself.
-pub(super) fn with_sources(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(error) = source {
-        let cause = error.to_string();
-        if !text.contains(&cause) {
-            text.push_str(": ");
-            text.push_str(&cause);
-        }
-        source = error.source();
-    }
-    one_line(&text)
 }
 
 /// A technique on a device of its own, so that memory is its own and a lost device is lost to it
@@ -254,7 +233,7 @@ impl GpuRunner<'_> {
             return Err("there is no device".into());
         };
         let frame = renderer.render(&self.request);
-        frame.map_err(|error| with_sources(&error))
+        frame.map_err(|error| line(&error))
     }
 }
 
@@ -265,11 +244,11 @@ impl Runner for GpuRunner<'_> {
             application_name: "antumbra".into(),
             ..Default::default()
         })
-        .map_err(|error| with_sources(&error))?;
+        .map_err(|error| line(&error))?;
         (self.on_device)(&mut gpu);
         let start = Instant::now();
         let renderer = FrameRenderer::new(gpu, self.scene);
-        self.renderer = Some(renderer.map_err(|error| with_sources(&error))?);
+        self.renderer = Some(renderer.map_err(|error| line(&error))?);
         let load = milliseconds(start);
         let first_frame = self.render()?.frame_ms;
         for _ in 1..WARM_UP_FRAMES {
@@ -373,7 +352,7 @@ impl RivalRunner<'_> {
         let start = Instant::now();
         let cast = self.rival.borrow_mut().cast(&view);
         let ms = start.elapsed().as_secs_f64() * 1e3;
-        let cast = cast.map_err(|error| with_sources(&*error))?;
+        let cast = cast.map_err(|error| line(&*error))?;
         Ok(Round {
             visibility: cast.visibility,
             visibility_ms: Some(cast.ms.unwrap_or(ms)),

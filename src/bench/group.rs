@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::cell::{Cell, GpuRunner, RivalRunner, Runner, measure_in_turn, with_sources};
+use super::cell::{Cell, GpuRunner, RivalRunner, Runner, measure_in_turn};
 use super::contender::{Contender, ContenderError, Method};
 use super::pictures;
 use super::results::{Entry, Failure, FailureKind, ReferenceEntry, StandardError, rounded};
@@ -16,6 +16,7 @@ use crate::capture::FrameRequest;
 use crate::capture::output::{Output, OutputError};
 use crate::gpu::Gpu;
 use crate::measure::measure;
+use crate::message::line;
 use crate::reference::{Cache, Reference, ReferenceError, Sampling, Settings, Truth};
 use crate::scene::{LoadOptions, Scene, SceneCamera, SceneError, SceneLight};
 use crate::stress;
@@ -247,7 +248,7 @@ impl<'s> Engines<'s> {
                 rival: Rc::new(RefCell::new(rival)),
                 ms,
             }),
-            Err(error) => Err(with_sources(&*error)),
+            Err(error) => Err(line(&*error)),
         };
         self.built.push((engine, built.clone()));
         built

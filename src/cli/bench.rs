@@ -364,7 +364,7 @@ fn work() -> Result<(), CliError> {
     };
     match group::run(&job, &on_step, &on_device) {
         Ok(group) => say("result", &serde_json::to_string(&group)?),
-        Err(error) => say("failed", &super::error::line(&error)),
+        Err(error) => say("failed", &crate::message::line(&error)),
     }
 }
 

@@ -7,6 +7,7 @@ use ash::vk;
 use crate::capture::CaptureError;
 use crate::capture::output::OutputError;
 use crate::gpu::{GpuError, ValidationMessage};
+use crate::message::one_line;
 use crate::scene::SceneError;
 
 /// Exit code for a wrong command line.
@@ -94,22 +95,6 @@ impl CliError {
     }
 }
 
-/// The error and its sources on one line. Messages that quote their source already are not given
-/// it twice.
-pub(super) fn line(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(error) = source {
-        let cause = error.to_string();
-        if !text.contains(&cause) {
-            text.push_str(": ");
-            text.push_str(&cause);
-        }
-        source = error.source();
-    }
-    one_line(&text)
-}
-
 /// What clap has to say, on one line: without the usage and the pointer to the help.
 pub(super) fn usage_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
@@ -132,20 +117,10 @@ pub(super) fn usage_line(error: &clap::Error) -> String {
     one_line(&line)
 }
 
-/// Line breaks become spaces and other control characters `?`, whatever files are called.
-fn one_line(text: &str) -> String {
-    let parts: Vec<&str> = text.split(['\n', '\r']).map(str::trim).collect();
-    let joined = parts
-        .into_iter()
-        .filter(|part| !part.is_empty())
-        .collect::<Vec<_>>()
-        .join(" ");
-    joined.replace(char::is_control, "?")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::message::line;
 
     #[derive(Debug, thiserror::Error)]
     #[error("{text}")]

@@ -87,7 +87,7 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => fail(&error::line(&error), error.exit_code()),
+        Err(error) => fail(&crate::message::line(&error), error.exit_code()),
     }
 }
 

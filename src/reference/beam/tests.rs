@@ -1,4 +1,3 @@
-
 use super::super::samples::{LightFrom, Sequence};
 use super::*;
 use crate::light::{AreaLight, LightShape};

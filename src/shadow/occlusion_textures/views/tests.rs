@@ -1,4 +1,3 @@
-
 use super::*;
 use glam::{Vec3, Vec4};
 

@@ -255,7 +255,9 @@ impl LightViews {
         self.push([right, up, forward], low, high, depth, None);
     }
 
-    fn push_perspective(
+    /// Adds the perspective view from `center` along the last axis of `frame` (right, up, forward),
+    /// between two corners in tangents of angles.
+    pub(super) fn push_perspective(
         &mut self,
         center: DVec3,
         frame: [DVec3; 3],

@@ -27,9 +27,21 @@ pub(super) fn add_maps<'f>(
     views: &LightViews,
     target: DrawTarget,
 ) -> ShadowMap {
+    add_maps_of_size(graph, inputs, technique, views, target, MAP_SIZE)
+}
+
+/// As [`add_maps`], of another width and height in texels.
+pub(super) fn add_maps_of_size<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    technique: &str,
+    views: &LightViews,
+    target: DrawTarget,
+    size: u32,
+) -> ShadowMap {
     let name = &inputs.light_name;
     let layers = views.views.len().max(1) as u32;
-    let side = if views.views.is_empty() { 1 } else { MAP_SIZE };
+    let side = if views.views.is_empty() { 1 } else { size };
     let image = |format| ImageDesc::new(format, side, side).layers(layers);
     let depth = image(vk::Format::D32_SFLOAT);
     let mut depth = graph.create_image(format!("{technique}.map_depth {name}"), depth);

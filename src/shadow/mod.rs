@@ -5,6 +5,7 @@ mod light_params;
 mod light_view;
 mod map;
 pub mod occlusion_textures;
+pub mod oess;
 pub mod pcss;
 mod receivers;
 mod technique;

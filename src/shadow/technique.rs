@@ -3,6 +3,7 @@
 //! A new technique adds its module, one variant here with its arms, and its folder of shaders.
 
 use super::occlusion_textures::{self, OcclusionOptions};
+use super::oess::{self, OessOptions};
 use super::pcss::PcssOptions;
 use super::{ShadowInputs, ShadowMask, hard, pcss};
 use crate::graph::Graph;
@@ -20,6 +21,8 @@ pub enum Technique {
     Pcss(PcssOptions),
     /// Slices of the scene as textures, averaged over what the light covers of them.
     OcclusionTextures(OcclusionOptions),
+    /// Edges that divide a line light into a part that is seen and one that is not.
+    Oess(OessOptions),
 }
 
 /// One option of a technique.
@@ -116,6 +119,7 @@ impl Technique {
         }),
         Self::Pcss(PcssOptions::DEFAULT),
         Self::OcclusionTextures(OcclusionOptions::DEFAULT),
+        Self::Oess(OessOptions::DEFAULT),
     ];
 
     /// The name on the command line and in reports.
@@ -125,6 +129,7 @@ impl Technique {
             Self::Pcf(_) => "pcf",
             Self::Pcss(_) => "pcss",
             Self::OcclusionTextures(_) => occlusion_textures::NAME,
+            Self::Oess(_) => oess::NAME,
         }
     }
 
@@ -138,6 +143,9 @@ impl Technique {
             }
             Self::OcclusionTextures(_) => {
                 "slices of the scene, each averaged over what the light covers of it"
+            }
+            Self::Oess(_) => {
+                "edges seen from both ends of a line light, which hide a part of it from each surface"
             }
         }
     }
@@ -155,6 +163,7 @@ impl Technique {
                 "E. Eisemann, X. Decoret: Plausible Image Based Soft Shadows Using Occlusion \
                  Textures. SIBGRAPI 2006"
             }
+            Self::Oess(_) => "C. L. Reimann, B. Dreier: Occluding Edges Soft Shadows",
         })
     }
 
@@ -163,6 +172,7 @@ impl Technique {
         match self {
             Self::Hard | Self::Pcf(_) | Self::Pcss(_) => &ShapeKind::ALL,
             Self::OcclusionTextures(_) => occlusion_textures::SHAPES,
+            Self::Oess(_) => oess::SHAPES,
         }
     }
 
@@ -173,6 +183,7 @@ impl Technique {
             Self::Pcf(_) => &[TAPS, RADIUS, PATTERN],
             Self::Pcss(_) => &[TAPS, SEARCH, PATTERN],
             Self::OcclusionTextures(_) => OcclusionOptions::ALL,
+            Self::Oess(_) => OessOptions::ALL,
         }
     }
 
@@ -184,6 +195,7 @@ impl Technique {
             Self::Pcf(o) => vec![o.taps.to_string(), o.radius.to_string(), pattern(o)],
             Self::Pcss(o) => vec![o.taps.to_string(), o.search.to_string(), pattern(o)],
             Self::OcclusionTextures(o) => o.values(),
+            Self::Oess(o) => o.values(),
         };
         let names = self.options().iter().map(|option| option.name);
         names.zip(values).collect()
@@ -194,6 +206,7 @@ impl Technique {
         let count = || value.parse::<u32>().ok().filter(|n| (1..=256).contains(n));
         match (self, option) {
             (Self::OcclusionTextures(o), _) => o.set(option, value)?,
+            (Self::Oess(o), _) => o.set(option, value)?,
             (Self::Pcf(o) | Self::Pcss(o), "taps") => o.taps = count()?,
             (Self::Pcss(o), "search") => o.search = count()?,
             (Self::Pcf(o), "radius") => {
@@ -236,6 +249,7 @@ impl Technique {
             Self::OcclusionTextures(options) => {
                 occlusion_textures::add_passes(graph, inputs, options)
             }
+            Self::Oess(options) => oess::add_passes(graph, inputs, options),
             Self::Pcf(options) | Self::Pcss(options) => {
                 pcss::add_passes(graph, inputs, self.name(), options)
             }

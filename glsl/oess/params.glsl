@@ -1,0 +1,31 @@
+// The uniform block of `oess`, and what an outreach map holds.
+#ifndef ANTUMBRA_OESS_PARAMS_GLSL
+#define ANTUMBRA_OESS_PARAMS_GLSL
+
+#include "common/light_view.glsl"
+
+const uint MAX_SECTORS = 4u;
+const uint MAX_POINTS = 5u;
+
+struct OessParams {
+    vec4 start;   // xyz: the line's first point, scene space; w: length of a segment, metres
+    vec4 axis;    // xyz: unit vector along the line
+    uvec4 counts; // sectors, points of the line, texels across and down a map
+    vec4 shift[MAX_SECTORS]; // x: texels that a point moves from one end's map to the next's, for
+                             // stored depth 1
+    LightView views[MAX_SECTORS * MAX_POINTS]; // sector * points + point
+};
+
+// An outreach map's texel: the column plus one of the occluding edge of the surface seen there, 0 for
+// none, and above it the column plus one of the last texel of the same surface's run.
+const uint EDGE_BITS = 16u;
+
+uint edge_of(uint texel) {
+    return texel & 0xffffu;
+}
+
+uint run_of(uint texel) {
+    return texel >> EDGE_BITS;
+}
+
+#endif

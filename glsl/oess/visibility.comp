@@ -1,0 +1,183 @@
+#version 460
+// Visibility of a line light at every pixel, and how much of what is seen counts for its two ends.
+
+#include "common/materials.glsl"
+#include "common/octahedral.glsl"
+#include "common/tiles.glsl"
+#include "common/view_params.glsl"
+#include "oess/oess.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(set = 0, binding = 0, std140) uniform ViewBlock {
+    ViewParams view;
+};
+layout(set = 0, binding = 1, std140) uniform OessBlock {
+    OessParams params;
+};
+layout(set = 0, binding = 2) uniform sampler2D view_depth;
+layout(set = 0, binding = 3) uniform usampler2D geometric_normal;
+layout(set = 0, binding = 4) uniform usampler2D ids;
+layout(set = 0, binding = 5) uniform sampler2DArray map_depth;
+layout(set = 0, binding = 6) uniform usampler2DArray map_ids;
+layout(set = 0, binding = 7) uniform usampler2DArray outreach_forward;
+layout(set = 0, binding = 8) uniform usampler2DArray outreach_backward;
+layout(set = 0, binding = 9) uniform sampler2D triangles;
+layout(set = 0, binding = 10) uniform sampler2D materials;
+layout(set = 0, binding = 11) uniform sampler2D uvs;
+layout(set = 0, binding = 12) uniform sampler2D texels;
+layout(set = 0, binding = 13, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 14, std140) uniform Arguments {
+    TileArguments arguments;
+};
+layout(set = 0, binding = 15) uniform usampler2D list;
+layout(set = 0, binding = 16, rg32f) uniform writeonly image2D influences;
+
+vec4 gather_map_depths(vec2 place, uint layer) {
+    return textureGather(map_depth, vec3(place, float(layer)));
+}
+
+uvec4 gather_map_ids(vec2 place, uint layer) {
+    return textureGather(map_ids, vec3(place, float(layer)));
+}
+
+uvec4 gather_outreach(vec2 place, uint layer, bool backward) {
+    vec3 at = vec3(place, float(layer));
+    return backward ? textureGather(outreach_backward, at) : textureGather(outreach_forward, at);
+}
+
+uint fetch_outreach(ivec2 texel, uint layer, bool backward) {
+    ivec3 at = ivec3(texel, int(layer));
+    return backward ? texelFetch(outreach_backward, at, 0).x : texelFetch(outreach_forward, at, 0).x;
+}
+
+float fetch_map_depth(ivec2 texel, uint layer) {
+    return texelFetch(map_depth, ivec3(texel, int(layer)), 0).x;
+}
+
+uint fetch_map_id(ivec2 texel, uint layer) {
+    return texelFetch(map_ids, ivec3(texel, int(layer)), 0).x;
+}
+
+vec4 fetch_triangle_texel(uint texel) {
+    return texelFetch(triangles, triangle_texel_place(texel), 0);
+}
+
+vec4 fetch_material_texel(ivec2 place) {
+    return texelFetch(materials, place, 0);
+}
+
+vec4 fetch_uv_texel(ivec2 place) {
+    return texelFetch(uvs, place, 0);
+}
+
+vec4 fetch_texture_texel(ivec2 place) {
+    return texelFetch(texels, place, 0);
+}
+
+// A point of the line as the receiver sees it, from the map of one sector.
+End end_of(uint point, uint sector, Receiver receiver) {
+    End end;
+    end.position = params.start.xyz + params.axis.xyz * (params.start.w * float(point));
+    end.along = params.axis.xyz;
+    end.length_m = params.start.w;
+    end.texels = params.shift[sector].x;
+    end.layer = sector * params.counts.y + point;
+    end.outreach = sector * (params.counts.y - 1u) + point;
+    end.backward = false;
+    receiver.to_light = end.position - receiver.position;
+    end.facing = dot(receiver.normal, receiver.to_light) > 0.0;
+    LightView view = params.views[end.layer];
+    vec2 size_texels = vec2(params.counts.zw);
+    vec3 map = light_view_project(view, -receiver.to_light);
+    end.place = map.xy * size_texels;
+    end.seen = false;
+    if (end.facing) {
+        end.seen = hard_visibility(receiver, view, end.layer, map.xy, size_texels.x) > 0.5;
+    }
+    vec2 corner = (floor(end.place - 0.5) + 0.5) / size_texels;
+    end.plane = light_view_plane(view, -receiver.to_light, receiver.normal, corner);
+    end.plane.yz /= size_texels;
+    return end;
+}
+
+// The sector that a point lies in, counts.x for none.
+uint sector_of(vec3 p) {
+    uint sector = 0u;
+    bool found = false;
+    while (sector < params.counts.x && !found) {
+        LightView view = params.views[sector * params.counts.y];
+        vec3 map = light_view_project(view, p - params.start.xyz);
+        found = map.y == clamp(map.y, 0.0, 1.0) && map.z > 0.0;
+        sector += found ? 0u : 1u;
+    }
+    return sector;
+}
+
+// Adds the part of the line between two of its places, 0 to 1.
+void add_part(inout vec3 sum, float from, float to) {
+    float part = max(to - from, 0.0);
+    float end = part * 0.5 * (to + from);
+    sum += vec3(part, part - end, end);
+}
+
+void main() {
+    uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
+    if (index >= arguments.count) {
+        return;
+    }
+    uvec2 size = uvec2(textureSize(view_depth, 0));
+    uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
+    uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
+    uvec2 pixel = tile_of_entry(entry, tiles) * TILE_SIZE + gl_LocalInvocationID.xy;
+    if (any(greaterThanEqual(pixel, size))) {
+        return;
+    }
+    float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+    vec3 n = unpack_unit(texelFetch(geometric_normal, ivec2(pixel), 0).x);
+    vec3 p = view.camera.eye.xyz + depth * pixel_ray(view.camera, pixel);
+    uint id = texelFetch(ids, ivec2(pixel), 0).x;
+    Receiver receiver = Receiver(p, n, vec3(0.0), false, id);
+
+    // Visible part; what of it counts for the line's first end and for its last.
+    vec3 sum = vec3(1.0, 0.5, 0.5);
+    uint sector = depth > 0.0 ? sector_of(p) : params.counts.x;
+    if (depth > 0.0) {
+        // The part of the line above the receiver's plane.
+        float segments = float(params.counts.y - 1u);
+        vec3 last = params.start.xyz + params.axis.xyz * (params.start.w * segments);
+        float height_from = dot(n, params.start.xyz - p);
+        float height_to = dot(n, last - p);
+        float crossing = height_from / (height_from - height_to);
+        vec2 above = vec2(height_from > 0.0 ? 0.0 : height_to > 0.0 ? crossing : 1.0,
+            height_to > 0.0 ? 1.0 : height_from > 0.0 ? crossing : 0.0);
+        sum = vec3(0.0);
+        if (sector == params.counts.x) {
+            add_part(sum, above.x, above.y);
+        } else {
+            vec2 size_texels = vec2(params.counts.zw);
+            LightView first = params.views[sector * params.counts.y];
+            vec2 texel_m = abs(1.0 / first.scale.xy) / size_texels;
+            float widest_m = max(texel_m.x, texel_m.y);
+            End from = end_of(0u, sector, receiver);
+            for (uint segment = 0u; segment + 1u < params.counts.y; ++segment) {
+                End to = end_of(segment + 1u, sector, receiver);
+                End back = to;
+                back.backward = true;
+                back.along = -back.along;
+                back.outreach = from.outreach;
+                Parts parts = visible_parts(from, back, receiver, size_texels, widest_m);
+                float before = float(segment);
+                vec2 first_part = (parts.first + before) / segments;
+                vec2 middle_part = (parts.middle + before) / segments;
+                vec2 last_part = (parts.last + before) / segments;
+                add_part(sum, max(first_part.x, above.x), min(first_part.y, above.y));
+                add_part(sum, max(middle_part.x, above.x), min(middle_part.y, above.y));
+                add_part(sum, max(last_part.x, above.x), min(last_part.y, above.y));
+                from = to;
+            }
+        }
+    }
+    imageStore(visibility, ivec2(pixel), vec4(clamp(sum.x, 0.0, 1.0)));
+    imageStore(influences, ivec2(pixel), vec4(sum.yz, 0.0, 0.0));
+}

@@ -4,80 +4,16 @@
 mod support;
 
 use antumbra::capture::{CapturedFrame, FrameRenderer, FrameRequest, Samples};
-use antumbra::light::{AreaLight, LightShape};
-use antumbra::scene::{Aabb, Material, Primitive, Scene, SceneCamera, SceneLight};
+use antumbra::light::LightShape;
+use antumbra::scene::{Aabb, Scene, SceneCamera};
 use glam::Vec3;
-
-/// Height of the light above the floor, metres; the light is a square of 2 m over the origin.
-const HEIGHT: f32 = 10.0;
-const SIZE: u32 = 64;
-
-fn quad(name: &str, corners: [Vec3; 4]) -> Primitive {
-    Primitive {
-        name: name.to_string(),
-        normals: vec![Vec3::Y; 4],
-        positions: corners.to_vec(),
-        indices: vec![0, 1, 2, 0, 2, 3],
-        ..Primitive::default()
-    }
-}
-
-/// A level rectangle at a depth below the light.
-fn plate(name: &str, x: [f32; 2], z: [f32; 2], depth: f32) -> Primitive {
-    let corner = |x, z| Vec3::new(x, HEIGHT - depth, z);
-    let corners = [
-        corner(x[0], z[0]),
-        corner(x[0], z[1]),
-        corner(x[1], z[1]),
-        corner(x[1], z[0]),
-    ];
-    quad(name, corners)
-}
-
-fn floor() -> Primitive {
-    plate("floor", [-30.0, 30.0], [-30.0, 30.0], HEIGHT)
-}
+use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, quad, scene};
 
 fn square(half: f32) -> LightShape {
     LightShape::Rect {
         width: 2.0 * half,
         height: 2.0 * half,
     }
-}
-
-fn scene(primitives: Vec<Primitive>, shape: LightShape) -> Scene {
-    let center = Vec3::new(0.0, HEIGHT, 0.0);
-    let mut scene = Scene {
-        name: "closed form".to_string(),
-        primitives,
-        materials: vec![Material::default()],
-        lights: vec![SceneLight {
-            name: "lamp".to_string(),
-            node: None,
-            light: AreaLight::new(shape, center, Vec3::NEG_Y, Vec3::X),
-        }],
-        ..Scene::default()
-    };
-    scene.finish().unwrap();
-    scene
-}
-
-/// Looks down from 2 m above the floor and sees 1.6 m to each side: +X to the right.
-fn camera() -> SceneCamera {
-    SceneCamera {
-        position: Vec3::new(0.0, 2.0, 0.0),
-        forward: Vec3::NEG_Y,
-        right: Vec3::X,
-        up: Vec3::NEG_Z,
-        yfov: 2.0 * 0.8_f32.atan(),
-        znear: 0.01,
-        ..SceneCamera::framing(&Aabb::EMPTY)
-    }
-}
-
-/// Where a pixel's column lies on the floor.
-fn floor_x(column: u32) -> f32 {
-    1.6 * ((column as f32 + 0.5) / (SIZE / 2) as f32 - 1.0)
 }
 
 fn request(camera: &SceneCamera, size: [u32; 2], options: &str) -> FrameRequest {

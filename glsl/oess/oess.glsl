@@ -218,7 +218,9 @@ Edge row_border(End end, Receiver receiver, Row row, uvec2 starts, ivec2 columns
     if (!near && !other) {
         return NOWHERE;
     }
-    return edge_at(end, receiver, row, int(near ? starts.x : starts.y) - 1, false, texel_m);
+    Edge border = edge_at(end, receiver, row, int(near ? starts.x : starts.y) - 1, false, texel_m);
+    // The surface goes on to behind the receiver.
+    return border.kind == EDGE_NONE ? Edge(1.0, EDGE_TEXEL) : border;
 }
 
 // Where light can begin beyond what hides an end; 1 if nowhere.

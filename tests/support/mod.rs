@@ -10,6 +10,7 @@
 #[path = "../../build/glsl.rs"]
 pub mod glsl;
 pub mod host;
+pub mod plates;
 pub mod reflect;
 pub mod work;
 

@@ -11,6 +11,9 @@ use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, scene};
 /// Half the length of the line along x, metres.
 const HALF: f32 = 1.0;
 
+/// Depth of a plate below the light and its range along x; it is endless along z.
+type Plate = (f32, [f32; 2]);
+
 fn line(length: f32) -> LightShape {
     LightShape::Line { length }
 }
@@ -37,7 +40,7 @@ fn render(scene: &Scene, techniques: &[&str]) -> Vec<Vec<f32>> {
 }
 
 /// Part of the line that level plates, given by depth and x range, leave free of a point of the floor.
-fn truth(x: f32, plates: &[(f32, [f32; 2])]) -> f32 {
+fn truth(x: f32, plates: &[Plate]) -> f32 {
     const STEPS: u32 = 4000;
     let free = (0..STEPS).filter(|step| {
         let from = HALF * ((*step as f32 + 0.5) / (STEPS / 2) as f32 - 1.0);
@@ -50,14 +53,14 @@ fn truth(x: f32, plates: &[(f32, [f32; 2])]) -> f32 {
 }
 
 /// The largest error over the picture, in which nothing changes along z.
-fn worst(image: &[f32], plates: &[(f32, [f32; 2])]) -> f32 {
+fn worst(image: &[f32], plates: &[Plate]) -> f32 {
     let truths: Vec<f32> = (0..SIZE).map(|i| truth(floor_x(i), plates)).collect();
     let errors = image.iter().enumerate();
     let errors = errors.map(|(i, v)| (v - truths[i % SIZE as usize]).abs());
     errors.fold(0.0, f32::max)
 }
 
-fn plates(blockers: &[(f32, [f32; 2])]) -> Scene {
+fn plates(blockers: &[Plate]) -> Scene {
     let plates = blockers
         .iter()
         .map(|(depth, x)| plate("blocker", *x, [-30.0, 30.0], *depth));
@@ -71,7 +74,7 @@ const ROUNDING: f32 = 1.0 / 4000.0;
 #[test]
 fn half_planes_strips_and_slots_are_exact() {
     let _one = support::serial();
-    let cases: &[(&str, &[(f32, [f32; 2])])] = &[
+    let cases: &[(&str, &[Plate])] = &[
         ("half-plane", &[(5.0, [-30.0, 0.0])]),
         ("half-plane, near the light", &[(2.0, [0.1, 30.0])]),
         ("half-plane, near the floor", &[(7.9, [-30.0, 0.3])]),

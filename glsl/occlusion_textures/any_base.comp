@@ -3,9 +3,9 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(constant_id = 0) const int WORDS = 1;
+layout(constant_id = 0) const int WORDS = 4; // that the image has; others read as 0, 0, 1
 
-layout(set = 0, binding = 0) uniform usampler2DArray bits;
+layout(set = 0, binding = 0) uniform usampler2D bits;
 layout(set = 0, binding = 1, rgba32ui) uniform writeonly uimage2D level;
 
 void main() {
@@ -14,12 +14,9 @@ void main() {
         return;
     }
     uvec4 found = uvec4(0u);
-    for (int word = 0; word < WORDS; ++word) {
-        uint any_bits = 0u;
-        for (int i = 0; i < 16; ++i) {
-            any_bits |= texelFetch(bits, ivec3(4 * place + ivec2(i & 3, i >> 2), word), 0).x;
-        }
-        found[word] = any_bits;
+    for (int i = 0; i < 16; ++i) {
+        found |= texelFetch(bits, 4 * place + ivec2(i & 3, i >> 2), 0);
     }
-    imageStore(level, place, found);
+    bvec4 there = lessThan(ivec4(0, 1, 2, 3), ivec4(WORDS));
+    imageStore(level, place, mix(uvec4(0u), found, there));
 }

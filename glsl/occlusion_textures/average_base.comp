@@ -6,10 +6,9 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(constant_id = 0) const int WORDS = 1;
 layout(constant_id = 1) const int FINER = 1; // texels of the bits across
 
-layout(set = 0, binding = 0) uniform usampler2DArray bits;
+layout(set = 0, binding = 0) uniform usampler2D bits;
 layout(set = 0, binding = 1, std140) uniform GroupBlock {
     SliceGroups groups;
 };
@@ -28,12 +27,8 @@ void main() {
     vec2 sum = vec2(0.0);
     for (int sub = 0; sub < FINER * FINER; ++sub) {
         ivec2 at = FINER * place.xy + ivec2(sub % FINER, sub / FINER);
-        uvec2 hit = uvec2(0u);
-        for (int word = 0; word < WORDS; ++word) {
-            uint found = texelFetch(bits, ivec3(at, word), 0).x;
-            hit |= found & uvec2(groups.masks[group][word], prefix[word]);
-        }
-        sum += vec2(notEqual(hit, uvec2(0u)));
+        uvec4 found = texelFetch(bits, at, 0);
+        sum += vec2((found & groups.masks[group]) != uvec4(0u), (found & prefix) != uvec4(0u));
     }
     imageStore(averages, place, vec4(sum / float(FINER * FINER), 0.0, 0.0));
 }

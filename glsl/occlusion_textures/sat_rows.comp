@@ -11,7 +11,7 @@ layout(constant_id = 0) const int WORDS = 1;
 layout(constant_id = 1) const int FINER = 1;     // texels of the bits across a texel of the table
 layout(constant_id = 2) const uint PACKED = 1u;  // both sums in one word
 
-layout(set = 0, binding = 0) uniform usampler2DArray bits;
+layout(set = 0, binding = 0) uniform usampler2D bits;
 layout(set = 0, binding = 1, std140) uniform GroupBlock {
     SliceGroups groups;
 };
@@ -26,6 +26,18 @@ void store(ivec2 place, uint group, uint own, uint all_nearer) {
         imageStore(tables, ivec3(place, int(2u * group)), uvec4(own));
         imageStore(tables, ivec3(place, int(2u * group + 1u)), uvec4(all_nearer));
     }
+}
+
+// 1 for each mask that has a bit of what was found.
+uvec4 hits(uvec4 found, uvec4 a, uvec4 b, uvec4 c, uvec4 d) {
+    uvec4 both = found.x & uvec4(a.x, b.x, c.x, d.x);
+    if (WORDS > 1) {
+        both |= found.y & uvec4(a.y, b.y, c.y, d.y);
+    }
+    if (WORDS > 2) {
+        both |= found.z & uvec4(a.z, b.z, c.z, d.z) | found.w & uvec4(a.w, b.w, c.w, d.w);
+    }
+    return uvec4(notEqual(both, uvec4(0u)));
 }
 
 void main() {
@@ -55,16 +67,9 @@ void main() {
     for (int x = 0; x < side; ++x) {
         for (int sub = 0; sub < FINER * FINER; ++sub) {
             ivec2 place = FINER * ivec2(x, row) + ivec2(sub % FINER, sub / FINER);
-            uvec4 hit_own = uvec4(0u);
-            uvec4 hit_nearer = uvec4(0u);
-            for (int word = 0; word < WORDS; ++word) {
-                uint found = texelFetch(bits, ivec3(place, word), 0).x;
-                hit_own |= found & uvec4(masks[0][word], masks[1][word], masks[2][word], masks[3][word]);
-                hit_nearer |= found
-                    & uvec4(prefixes[0][word], prefixes[1][word], prefixes[2][word], prefixes[3][word]);
-            }
-            own += uvec4(notEqual(hit_own, uvec4(0u)));
-            nearer += uvec4(notEqual(hit_nearer, uvec4(0u)));
+            uvec4 found = texelFetch(bits, place, 0);
+            own += hits(found, masks[0], masks[1], masks[2], masks[3]);
+            nearer += hits(found, prefixes[0], prefixes[1], prefixes[2], prefixes[3]);
         }
         ivec2 place = ivec2(x + 1, row + 1);
         for (uint i = 0u; i < count; ++i) {

@@ -1,5 +1,5 @@
 #version 460
-// Marks the slice that a surface lies in.
+// The slice that a surface lies in as a bit, joined with what is there by a logic operation.
 
 layout(push_constant) uniform Push {
     mat4 clip_from_scene;
@@ -11,8 +11,10 @@ layout(push_constant) uniform Push {
 
 layout(location = 0) in float depth_m;
 
-#include "occlusion_textures/slice_bits.glsl"
+layout(location = 0) out uvec4 bits;
+
+#include "occlusion_textures/bits.glsl"
 
 void main() {
-    write_slice(depth_m, push.range, push.first_slice);
+    bits = slice_bit(depth_m, push.range);
 }

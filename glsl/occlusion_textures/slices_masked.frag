@@ -1,5 +1,5 @@
 #version 460
-// Marks the slice that a surface lies in, but for holes where alpha cuts them.
+// As slices.frag, but for holes where alpha cuts them.
 
 #include "common/materials.glsl"
 
@@ -17,7 +17,9 @@ layout(push_constant) uniform Push {
 layout(location = 0) in float depth_m;
 layout(location = 1) in vec2 surface_uv;
 
-#include "occlusion_textures/slice_bits.glsl"
+layout(location = 0) out uvec4 bits;
+
+#include "occlusion_textures/bits.glsl"
 
 vec4 fetch_material_texel(ivec2 place) {
     return texelFetch(materials, place, 0);
@@ -31,5 +33,5 @@ void main() {
     if (is_hole(push.material, surface_uv)) {
         discard;
     }
-    write_slice(depth_m, push.range, push.first_slice);
+    bits = slice_bit(depth_m, push.range);
 }

@@ -49,7 +49,7 @@ layout(set = 0, binding = 8, std140) uniform Arguments {
 };
 layout(set = 0, binding = 9) uniform usampler2D list;
 
-layout(set = 0, binding = 10) uniform usampler2DArray bits;
+layout(set = 0, binding = 10) uniform usampler2D bits;
 layout(set = 0, binding = 11, std140) uniform PlaneBlock {
     vec4 fine_planes[MAX_FINE_SLICES / 4u + 1u]; // depths of the planes between fine slices
 };
@@ -151,9 +151,9 @@ bool ray_hits(Receiver at, uint slice, vec2 place) {
     float apart = abs(own_depth(at, u + vec2(texel.x, 0.0)) - own)
         + abs(own_depth(at, u + vec2(0.0, texel.y)) - own);
     ivec2 entry = ivec2(floor(map * DETAIL));
-    bool inside = all(equal(entry, clamp(entry, ivec2(0), textureSize(bits, 0).xy - 1)));
-    uint found = inside ? texelFetch(bits, ivec3(entry, int(slice >> 5)), 0).x : 0u;
-    return lower < own - apart && (found >> (slice & 31u) & 1u) != 0u;
+    bool inside = all(equal(entry, clamp(entry, ivec2(0), textureSize(bits, 0) - 1)));
+    uvec4 found = inside ? texelFetch(bits, entry, 0) : uvec4(0u);
+    return lower < own - apart && (found[slice >> 5] >> (slice & 31u) & 1u) != 0u;
 }
 
 // The part of rays towards the light that nothing near the receiver blocks: in groups from the first

@@ -45,28 +45,75 @@ pub fn draw_scene(
     clip_from_scene: &Mat4,
     target: DrawTarget,
 ) -> Result<(), GpuError> {
-    let seen = |draw: &&Draw| frustum_sees(clip_from_scene, &draw.bounds);
-    let seen: Vec<&Draw> = scene.draws().iter().filter(seen).collect();
-    let runs = runs(&seen);
     let depth = Some(DepthState {
         compare: vk::CompareOp::GREATER,
         write: true,
     });
+    let (solid, masked_fragment) = match target {
+        DrawTarget::Ids => {
+            let fragment = Some(&spirv::RASTER_IDS_FRAG);
+            let solid = GraphicsPipelineDesc {
+                vertex_layout: vec![scene.id_stream()],
+                ..GraphicsPipelineDesc::new(&spirv::RASTER_IDS_VERT, fragment)
+            };
+            (solid, &spirv::RASTER_IDS_MASKED_FRAG)
+        }
+        DrawTarget::Depth => {
+            let solid = GraphicsPipelineDesc {
+                vertex_layout: vec![scene.position_stream()],
+                ..GraphicsPipelineDesc::new(&spirv::RASTER_DEPTH_VERT, None)
+            };
+            (solid, &spirv::RASTER_DEPTH_MASKED_FRAG)
+        }
+    };
+    let masked = GraphicsPipelineDesc {
+        vertex_layout: vec![scene.id_stream(), scene.mask_stream()],
+        depth,
+        ..GraphicsPipelineDesc::new(&spirv::RASTER_IDS_MASKED_VERT, Some(masked_fragment))
+    };
+    let shaders = SceneShaders {
+        solid: GraphicsPipelineDesc { depth, ..solid },
+        masked,
+    };
+    let clip_from_scene = *clip_from_scene;
+    draw_scene_with(ctx, scene, ids, &clip_from_scene, shaders, |material| {
+        let Some(material) = material else {
+            return bytemuck::bytes_of(&clip_from_scene).to_vec();
+        };
+        let push = MaskedPush {
+            clip_from_scene: clip_from_scene.to_cols_array_2d(),
+            material,
+        };
+        bytemuck::bytes_of(&push).to_vec()
+    })
+}
+
+/// What [`draw_scene_with`] draws with.
+#[derive(Clone, Debug)]
+pub struct SceneShaders {
+    /// For solid triangles; its first vertex stream is of [`SceneIds::vertices`].
+    pub solid: GraphicsPipelineDesc,
+    /// For triangles with holes cut by alpha; as well, and the second is of [`SceneIds::mask_uvs`].
+    /// Bindings 0 and 1 are [`SceneIds::materials`] and [`SceneIds::texels`].
+    pub masked: GraphicsPipelineDesc,
+}
+
+/// Draws all triangles that a view may see into the pass's attachments. `push` makes the push
+/// constants, for masked triangles those of a material. The pass has declared [`read_for_draw`].
+pub fn draw_scene_with(
+    ctx: &mut PassContext<'_>,
+    scene: &SceneBuffers,
+    ids: &SceneIds,
+    clip_from_scene: &Mat4,
+    shaders: SceneShaders,
+    push: impl Fn(Option<u32>) -> Vec<u8>,
+) -> Result<(), GpuError> {
+    let seen = |draw: &&Draw| frustum_sees(clip_from_scene, &draw.bounds);
+    let seen: Vec<&Draw> = scene.draws().iter().filter(seen).collect();
+    let runs = runs(&seen);
     let (masked, solid): (Vec<&Run>, Vec<&Run>) = runs.iter().partition(|run| run.mask.is_some());
     if !solid.is_empty() {
-        let mut pipeline = match target {
-            DrawTarget::Ids => {
-                let fragment = Some(&spirv::RASTER_IDS_FRAG);
-                GraphicsPipelineDesc::new(&spirv::RASTER_IDS_VERT, fragment)
-            }
-            DrawTarget::Depth => GraphicsPipelineDesc::new(&spirv::RASTER_DEPTH_VERT, None),
-        };
-        pipeline.vertex_layout = vec![match target {
-            DrawTarget::Ids => scene.id_stream(),
-            DrawTarget::Depth => scene.position_stream(),
-        }];
-        pipeline.depth = depth;
-        ctx.bind_graphics(pipeline, &[], bytemuck::bytes_of(clip_from_scene))?;
+        ctx.bind_graphics(shaders.solid, &[], &push(None))?;
         ctx.bind_vertices(&[(ids.vertices, 0)])?;
         ctx.bind_indices(ids.indices, 0)?;
         for run in solid {
@@ -74,23 +121,12 @@ pub fn draw_scene(
         }
     }
     for run in masked {
-        let fragment = Some(match target {
-            DrawTarget::Ids => &spirv::RASTER_IDS_MASKED_FRAG,
-            DrawTarget::Depth => &spirv::RASTER_DEPTH_MASKED_FRAG,
-        });
-        let mut pipeline = GraphicsPipelineDesc::new(&spirv::RASTER_IDS_MASKED_VERT, fragment);
-        pipeline.vertex_layout = vec![scene.id_stream(), scene.mask_stream()];
-        pipeline.depth = depth;
-        let push = MaskedPush {
-            clip_from_scene: clip_from_scene.to_cols_array_2d(),
-            material: run.mask.unwrap_or_default(),
-        };
         let nearest = SamplerDesc::nearest();
         let bindings = [
             Bind::sampled(0, ids.materials, nearest),
             Bind::sampled(1, ids.texels, nearest),
         ];
-        ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&push))?;
+        ctx.bind_graphics(shaders.masked.clone(), &bindings, &push(run.mask))?;
         ctx.bind_vertices(&[(ids.vertices, 0), (ids.mask_uvs, 0)])?;
         ctx.bind_indices(ids.indices, 0)?;
         ctx.draw_indexed(run.first_index, run.index_count, 0);

@@ -16,7 +16,7 @@ mod tiles;
 mod visible;
 
 pub use camera::{PixelCamera, frustum_sees};
-pub use draw::{DrawTarget, draw_scene, read_for_draw};
+pub use draw::{DrawTarget, SceneShaders, draw_scene, draw_scene_with, read_for_draw};
 pub use gbuffer::{GBuffer, add_gbuffer};
 pub use scene_buffers::{Draw, SceneBuffers, SceneIds, UploadError};
 pub use tiles::{TILE_SIZE, TileList, add_tile_bounds, tile_counts};

@@ -1,7 +1,9 @@
 //! The scene on the device: vertices and indices to draw, triangles and materials to look up.
 
 use super::scene_layout::{IMAGE_WIDTH, Layout, Vertex};
-use crate::gpu::{Buffer, Gpu, GpuError, Image, ImageSpec, MemoryLocation, Retired};
+use crate::gpu::{
+    Buffer, Gpu, GpuError, Image, ImageSpec, MemoryLocation, OptionalFeatures, Retired,
+};
 use crate::graph::{
     Access, BufferDesc, BufferId, BufferState, FrameCache, Graph, GraphError, HostBuffer,
     HostImage, ImageDesc, ImageId, ImagePart, ImageState, PassKind,
@@ -65,6 +67,7 @@ pub struct SceneBuffers {
     masked: bool,
     textured: usize,
     shiny: bool,
+    features: OptionalFeatures,
 }
 
 /// Number of buffers: vertices, texture coordinates of masked ones, indices.
@@ -136,10 +139,12 @@ impl SceneBuffers {
             gpu.retire(Retired::Buffer(buffer));
         }
         buffers.device = Some(device?);
+        buffers.features = gpu.optional();
         Ok(buffers)
     }
 
-    /// A stand-in without device, for planning frames of a scene.
+    /// A stand-in without device, for planning frames of a scene on a device with all optional
+    /// features.
     pub fn plan_only(scene: &Scene) -> Self {
         Self::without_device(scene, &Layout::new(scene))
     }
@@ -182,6 +187,7 @@ impl SceneBuffers {
                 .materials
                 .iter()
                 .any(|m| m.roughness < 1.0 || m.metallic > 0.0),
+            features: OptionalFeatures::ALL,
         }
     }
 
@@ -277,6 +283,11 @@ impl SceneBuffers {
             let images = device.images.into_iter().map(Retired::Image);
             buffers.chain(images).for_each(|it| gpu.retire(it));
         }
+    }
+
+    /// Features of the device that we could do without.
+    pub fn features(&self) -> OptionalFeatures {
+        self.features
     }
 
     /// Chunks of neighbouring triangles, masked ones first.

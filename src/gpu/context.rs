@@ -11,7 +11,7 @@ use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 use super::debug::{MessageLog, Messenger, ValidationMessage};
 use super::descriptors::Descriptors;
 use super::error::{CallResult, GpuError};
-use super::host::{HostDevice, RequiredFeatures, Requirements, requirements};
+use super::host::{HostDevice, OptionalFeatures, RequiredFeatures, Requirements, requirements};
 use super::instance::OwnInstance;
 use super::memory::MemoryUse;
 use super::pipelines::Pipelines;
@@ -43,6 +43,7 @@ pub struct GpuOptions {
 pub struct Gpu {
     pub(super) info: DeviceInfo,
     pub(super) physical: vk::PhysicalDevice,
+    pub(super) optional: OptionalFeatures,
     pub(super) device: ash::Device,
     pub(super) queue: vk::Queue,
     pub(super) queue_family: u32,
@@ -109,6 +110,7 @@ impl Gpu {
             queue,
             frames_in_flight: 1,
             allocator: None,
+            optional: OptionalFeatures::supported(&own.instance, physical),
         };
         match Self::build(host, true, own.log.clone()) {
             Ok(mut gpu) => {
@@ -190,6 +192,7 @@ impl Gpu {
             timestamps: Timestamps::new(slot_count, valid_bits, info.limits.timestamp_period),
             info,
             physical: host.physical,
+            optional: host.optional,
             device: host.device,
             queue: host.queue,
             queue_family: host.queue_family,
@@ -327,6 +330,12 @@ impl Gpu {
         &self.info
     }
 
+    /// Features that the device has and that we could do without.
+    #[must_use]
+    pub fn optional(&self) -> OptionalFeatures {
+        self.optional
+    }
+
     /// How many frames may be in flight: 1 on our own device.
     #[must_use]
     pub fn frames_in_flight(&self) -> u32 {
@@ -391,6 +400,7 @@ fn create_device(
     let extension_names: Vec<_> = extensions.iter().map(|e| e.as_ptr()).collect();
     let mut features = RequiredFeatures::new();
     let mut chain = features.chain();
+    OptionalFeatures::supported(instance, physical).enable(&mut chain.features);
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extension_names)

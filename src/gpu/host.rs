@@ -36,6 +36,37 @@ pub struct HostDevice {
     /// Whether the instance has `VK_EXT_debug_utils` enabled; then our objects get names and our
     /// passes labels.
     pub debug_utils: bool,
+    /// Features that we can do without and that the device was made with.
+    pub optional: OptionalFeatures,
+}
+
+/// Features that make something faster where a device has them; without them it is done another way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OptionalFeatures {
+    /// `logicOp`: bits are set in integer attachments.
+    pub logic_op: bool,
+}
+
+impl OptionalFeatures {
+    /// All of them.
+    pub const ALL: Self = Self { logic_op: true };
+
+    /// Those that the physical device can be made with.
+    #[must_use]
+    pub fn supported(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Self {
+        // SAFETY: the handles are live by the caller's promise.
+        let features = unsafe { instance.get_physical_device_features(physical) };
+        Self {
+            logic_op: features.logic_op == vk::TRUE,
+        }
+    }
+
+    /// Switches these on in what a device is made with and leaves the others alone.
+    pub fn enable(self, features: &mut vk::PhysicalDeviceFeatures) {
+        if self.logic_op {
+            features.logic_op = vk::TRUE;
+        }
+    }
 }
 
 /// Something the device has to have, and why.

@@ -32,7 +32,9 @@ pub use descriptors::{SetResource, SetWrite};
 pub use error::GpuError;
 pub use gpu_allocator::MemoryLocation;
 pub use gpu_allocator::vulkan::Allocation;
-pub use host::{HostDevice, RequiredFeatures, Requirement, Requirements, requirements};
+pub use host::{
+    HostDevice, OptionalFeatures, RequiredFeatures, Requirement, Requirements, requirements,
+};
 pub use memory::{Buffer, Image, ImageSpec, MemoryUse};
 pub use pipeline_desc::{
     Blend, ComputePipelineDesc, DepthState, GraphicsPipelineDesc, PipelineHandle, VertexStream,

@@ -77,6 +77,9 @@ pub enum Blend {
     Max,
     /// Product.
     Multiply,
+    /// Bits of either, in integer formats; needs
+    /// [`OptionalFeatures::logic_op`](super::OptionalFeatures::logic_op).
+    Or,
 }
 
 /// A graphics pipeline for dynamic rendering. Viewport and scissor are dynamic.

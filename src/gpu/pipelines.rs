@@ -92,7 +92,7 @@ impl Constants {
 
 fn blend_state(blend: Blend) -> vk::PipelineColorBlendAttachmentState {
     let (src, dst, op) = match blend {
-        Blend::None => (
+        Blend::None | Blend::Or => (
             vk::BlendFactor::ONE,
             vk::BlendFactor::ZERO,
             vk::BlendOp::ADD,
@@ -111,7 +111,7 @@ fn blend_state(blend: Blend) -> vk::PipelineColorBlendAttachmentState {
         _ => (src, dst),
     };
     vk::PipelineColorBlendAttachmentState::default()
-        .blend_enable(blend != Blend::None)
+        .blend_enable(!matches!(blend, Blend::None | Blend::Or))
         .src_color_blend_factor(src)
         .dst_color_blend_factor(dst)
         .color_blend_op(op)
@@ -318,7 +318,10 @@ impl Gpu {
                 .depth_compare_op(state.compare);
         }
         let attachments = vec![blend_state(desc.blend); desc.color_formats.len()];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
+        let blend = vk::PipelineColorBlendStateCreateInfo::default()
+            .logic_op_enable(desc.blend == Blend::Or)
+            .logic_op(vk::LogicOp::OR)
+            .attachments(&attachments);
         let dynamic = vk::PipelineDynamicStateCreateInfo::default()
             .dynamic_states(&[vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
         let depth_format = desc.depth_format.unwrap_or(vk::Format::UNDEFINED);

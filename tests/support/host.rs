@@ -112,6 +112,7 @@ impl Host {
     /// What the host hands over.
     pub fn lend(&self, frames_in_flight: u32) -> HostDevice {
         HostDevice {
+            optional: antumbra::gpu::OptionalFeatures::default(),
             entry: Some(self.entry.clone()),
             instance: self.instance.clone(),
             physical: self.physical,

@@ -62,7 +62,7 @@ fn add_tables(
     pass.record(move |ctx| {
         let shader = &spirv::OCCLUSION_TEXTURES_SAT_ROWS_COMP;
         let bindings = [
-            Bind::sampled(0, bits, SamplerDesc::nearest()).array(),
+            Bind::sampled(0, bits, SamplerDesc::nearest()),
             Bind::uniform(1, groups),
             Bind::storage_image(2, tables).array(),
         ];
@@ -140,7 +140,7 @@ fn add_averages(
     pass.record(move |ctx| {
         let shader = &spirv::OCCLUSION_TEXTURES_AVERAGE_BASE_COMP;
         let bindings = [
-            Bind::sampled(0, bits, SamplerDesc::nearest()).array(),
+            Bind::sampled(0, bits, SamplerDesc::nearest()),
             Bind::uniform(1, groups),
             Bind::storage_image(2, written).part(part).array(),
         ];

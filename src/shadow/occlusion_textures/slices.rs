@@ -3,8 +3,10 @@
 use super::options::{Combine, OcclusionOptions};
 use super::views::{OcclusionView, SlicedView};
 use super::{NAME, ShadowInputs};
-use crate::geometry::{Draw, SceneBuffers, SceneIds, frustum_sees, read_for_draw};
-use crate::gpu::{Blend, ComputePipelineDesc, GpuError, GraphicsPipelineDesc, SamplerDesc, spirv};
+use crate::geometry::{SceneBuffers, SceneIds, SceneShaders, draw_scene_with, read_for_draw};
+use crate::gpu::{
+    Blend, ComputePipelineDesc, GpuError, GraphicsPipelineDesc, SamplerDesc, Shader, spirv,
+};
 use crate::graph::{
     Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, ImagePart, Load, PassContext,
     PassKind, Stage,
@@ -19,6 +21,8 @@ const SLICES_A_PASS: u32 = 32;
 const ATTACHMENTS: u32 = 8;
 /// Most fine slices, and most groups of them.
 pub(super) const MOST_SLICES: u64 = 128;
+/// Words of 32 bits for [`MOST_SLICES`].
+const MOST_WORDS: u32 = 4;
 /// Texels of the bits across one of the pyramid's first level.
 const ANY_BASE: u32 = 4;
 
@@ -27,7 +31,7 @@ const ANY_BASE: u32 = 4;
 pub(super) struct Slices {
     /// `OcclusionView`: a uniform buffer.
     pub params: BufferId,
-    /// R32_UINT, a layer for each word: the slices that block at a texel.
+    /// R32_UINT, R32G32_UINT or R32G32B32A32_UINT: the slices that block at a texel.
     pub bits: ImageId,
     /// RGBA32_UINT with mip levels: slices that block anywhere in a texel of 4x4, 8x8, ..
     pub any: ImageId,
@@ -71,47 +75,21 @@ pub(super) fn add_slices<'f>(
     let (params, planes) = add_params(graph, &name, view);
     let side = options.resolution;
     let fine = options.fine_slices();
-    let words = options.words();
-    let bits = ImageDesc::new(vk::Format::R32_UINT, side, side).layers(words);
-    let mut bits = graph.create_image(format!("{NAME}.bits {name}"), bits);
-    for word in 0..words {
-        let marks = ImageDesc::new(vk::Format::R8G8B8A8_UNORM, side, side).layers(ATTACHMENTS);
-        let mut marks = graph.create_image(format!("{NAME}.marks {name}.{word}"), marks);
-        let mut pass = graph.pass(format!("{NAME}.slices {name}.{word}"), PassKind::Graphics);
-        read_for_draw(&mut pass, inputs.scene, &inputs.ids);
-        for layer in 0..ATTACHMENTS {
-            marks = pass.color_part(marks, ImagePart::layer(layer), Load::Clear([0.0; 4]));
-        }
-        let push = SlicesPush {
-            clip_from_scene: view.clip_from_scene.to_cols_array_2d(),
-            depth: view.depth,
-            range: [
-                view.params.range[0],
-                view.params.range[1],
-                view.params.range[2],
-                fine as f32,
-            ],
-            first_slice: word * SLICES_A_PASS,
-            material: 0,
-        };
-        let (scene, ids, matrix) = (inputs.scene, inputs.ids, view.clip_from_scene);
-        pass.record(move |ctx| draw_slices(ctx, scene, &ids, &matrix, push));
-
-        let mut pass = graph.pass(format!("{NAME}.pack {name}.{word}"), PassKind::Compute);
-        pass.read(marks, Access::Sampled(Stage::Compute));
-        let part = ImagePart::layer(word);
-        bits = pass.overwrite_part(bits, part, Access::StorageWrite(Stage::Compute));
-        pass.record(move |ctx| {
-            let shader = &spirv::OCCLUSION_TEXTURES_PACK_COMP;
-            let bindings = [
-                Bind::sampled(0, marks, SamplerDesc::nearest()).array(),
-                Bind::storage_image(1, bits).part(part),
-            ];
-            ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
-            ctx.dispatch(shader.groups([side, side, 1]));
-            Ok(())
-        });
-    }
+    let joined = inputs.scene.features().logic_op;
+    let words = if joined { options.words() } else { MOST_WORDS };
+    let bits = ImageDesc::new(bits_format(words), side, side);
+    let bits = graph.create_image(format!("{NAME}.bits {name}"), bits);
+    let drawing = Drawing {
+        view,
+        fine,
+        words: options.words(),
+        name: &name,
+    };
+    let bits = if joined {
+        add_bits(graph, inputs, &drawing, bits)
+    } else {
+        add_packed_marks(graph, inputs, &drawing, bits)
+    };
     let any = add_pyramid(graph, &name, bits, side, words);
     let groups = add_groups(graph, &name, options, view, any, planes);
     Slices {
@@ -145,62 +123,136 @@ fn add_params(graph: &mut Graph<'_>, name: &str, view: &SlicedView) -> (BufferId
     (params, planes)
 }
 
+/// The narrowest format with these many words of 32 bits.
+fn bits_format(words: u32) -> vk::Format {
+    match words {
+        1 => vk::Format::R32_UINT,
+        2 => vk::Format::R32G32_UINT,
+        _ => vk::Format::R32G32B32A32_UINT,
+    }
+}
+
+/// What is drawn into the slices of one view.
+#[derive(Clone, Copy)]
+struct Drawing<'a> {
+    view: &'a SlicedView,
+    fine: u32,
+    words: u32,
+    name: &'a str,
+}
+
+impl Drawing<'_> {
+    fn push(&self, first_slice: u32) -> SlicesPush {
+        let range = self.view.params.range;
+        SlicesPush {
+            clip_from_scene: self.view.clip_from_scene.to_cols_array_2d(),
+            depth: self.view.depth,
+            range: [range[0], range[1], range[2], self.fine as f32],
+            first_slice,
+            material: 0,
+        }
+    }
+}
+
+/// All slices at once: their bits are joined by the attachment.
+fn add_bits<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    drawing: &Drawing<'_>,
+    bits: ImageId,
+) -> ImageId {
+    let pass_name = format!("{NAME}.slices {}", drawing.name);
+    let mut pass = graph.pass(pass_name, PassKind::Graphics);
+    read_for_draw(&mut pass, inputs.scene, &inputs.ids);
+    let bits = pass.color(bits, Load::Clear([0.0; 4]));
+    let (scene, ids, push) = (inputs.scene, inputs.ids, drawing.push(0));
+    pass.record(move |ctx| {
+        let solid = &spirv::OCCLUSION_TEXTURES_SLICES_FRAG;
+        let masked = &spirv::OCCLUSION_TEXTURES_SLICES_MASKED_FRAG;
+        draw_slices(ctx, scene, &ids, push, (solid, masked), Blend::Or)
+    });
+    bits
+}
+
+/// Where attachments cannot join bits: each slice is a channel, joined by maximum, and 32 of them
+/// make a word.
+fn add_packed_marks<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    drawing: &Drawing<'_>,
+    mut bits: ImageId,
+) -> ImageId {
+    let Some(ImageDesc { width: side, .. }) = graph.image_desc(bits) else {
+        return bits;
+    };
+    for word in 0..drawing.words {
+        let name = format!("{}.{word}", drawing.name);
+        let marks = ImageDesc::new(vk::Format::R8G8B8A8_UNORM, side, side).layers(ATTACHMENTS);
+        let mut marks = graph.create_image(format!("{NAME}.marks {name}"), marks);
+        let mut pass = graph.pass(format!("{NAME}.slices {name}"), PassKind::Graphics);
+        read_for_draw(&mut pass, inputs.scene, &inputs.ids);
+        for layer in 0..ATTACHMENTS {
+            marks = pass.color_part(marks, ImagePart::layer(layer), Load::Clear([0.0; 4]));
+        }
+        let push = drawing.push(word * SLICES_A_PASS);
+        let (scene, ids) = (inputs.scene, inputs.ids);
+        pass.record(move |ctx| {
+            let solid = &spirv::OCCLUSION_TEXTURES_MARKS_FRAG;
+            let masked = &spirv::OCCLUSION_TEXTURES_MARKS_MASKED_FRAG;
+            draw_slices(ctx, scene, &ids, push, (solid, masked), Blend::Max)
+        });
+
+        let mut pass = graph.pass(format!("{NAME}.pack {name}"), PassKind::Compute);
+        pass.read(marks, Access::Sampled(Stage::Compute));
+        bits = if word == 0 {
+            pass.overwrite(bits, Access::StorageWrite(Stage::Compute))
+        } else {
+            pass.write(bits, Access::StorageReadWrite(Stage::Compute))
+        };
+        let written = bits;
+        pass.record(move |ctx| {
+            let shader = &spirv::OCCLUSION_TEXTURES_PACK_COMP;
+            let bindings = [
+                Bind::sampled(0, marks, SamplerDesc::nearest()).array(),
+                Bind::storage_image(1, written),
+            ];
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(0, word)],
+                ..ComputePipelineDesc::new(shader)
+            };
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            ctx.dispatch(shader.groups([side, side, 1]));
+            Ok(())
+        });
+    }
+    bits
+}
+
 fn draw_slices(
     ctx: &mut PassContext<'_>,
     scene: &SceneBuffers,
     ids: &SceneIds,
-    clip_from_scene: &Mat4,
     push: SlicesPush,
+    (solid, masked): (&'static Shader, &'static Shader),
+    blend: Blend,
 ) -> Result<(), GpuError> {
-    let draws = scene.draws();
-    let seen = draws
-        .iter()
-        .filter(|draw| frustum_sees(clip_from_scene, &draw.bounds));
-    let (masked, solid): (Vec<&Draw>, Vec<&Draw>) = seen.partition(|draw| draw.mask.is_some());
-    let pipeline = |vertex, fragment| GraphicsPipelineDesc {
-        blend: Blend::Max,
-        ..GraphicsPipelineDesc::new(vertex, Some(fragment))
+    let shaders = SceneShaders {
+        solid: GraphicsPipelineDesc {
+            vertex_layout: vec![scene.position_stream()],
+            blend,
+            ..GraphicsPipelineDesc::new(&spirv::OCCLUSION_TEXTURES_SLICES_VERT, Some(solid))
+        },
+        masked: GraphicsPipelineDesc {
+            vertex_layout: vec![scene.position_stream(), scene.mask_stream()],
+            blend,
+            ..GraphicsPipelineDesc::new(&spirv::OCCLUSION_TEXTURES_SLICES_MASKED_VERT, Some(masked))
+        },
     };
-    if !solid.is_empty() {
-        let vertex = &spirv::OCCLUSION_TEXTURES_SLICES_VERT;
-        let mut pipeline = pipeline(vertex, &spirv::OCCLUSION_TEXTURES_SLICES_FRAG);
-        pipeline.vertex_layout = vec![scene.position_stream()];
-        ctx.bind_graphics(pipeline, &[], bytemuck::bytes_of(&push))?;
-        ctx.bind_vertices(&[(ids.vertices, 0)])?;
-        ctx.bind_indices(ids.indices, 0)?;
-        // Neighbouring chunks are one draw.
-        let mut runs: Vec<(u32, u32)> = Vec::new();
-        for draw in solid {
-            match runs.last_mut() {
-                Some((first, count)) if *first + *count == draw.first_index => {
-                    *count += draw.index_count;
-                }
-                _ => runs.push((draw.first_index, draw.index_count)),
-            }
-        }
-        for (first, count) in runs {
-            ctx.draw_indexed(first, count, 0);
-        }
-    }
-    for draw in masked {
-        let vertex = &spirv::OCCLUSION_TEXTURES_SLICES_MASKED_VERT;
-        let mut pipeline = pipeline(vertex, &spirv::OCCLUSION_TEXTURES_SLICES_MASKED_FRAG);
-        pipeline.vertex_layout = vec![scene.position_stream(), scene.mask_stream()];
-        let push = SlicesPush {
-            material: draw.mask.unwrap_or_default(),
-            ..push
-        };
-        let nearest = SamplerDesc::nearest();
-        let bindings = [
-            Bind::sampled(0, ids.materials, nearest),
-            Bind::sampled(1, ids.texels, nearest),
-        ];
-        ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&push))?;
-        ctx.bind_vertices(&[(ids.vertices, 0), (ids.mask_uvs, 0)])?;
-        ctx.bind_indices(ids.indices, 0)?;
-        ctx.draw_indexed(draw.first_index, draw.index_count, 0);
-    }
-    Ok(())
+    let matrix = Mat4::from_cols_array_2d(&push.clip_from_scene);
+    draw_scene_with(ctx, scene, ids, &matrix, shaders, |material| {
+        let material = material.unwrap_or_default();
+        bytemuck::bytes_of(&SlicesPush { material, ..push }).to_vec()
+    })
 }
 
 fn add_pyramid(graph: &mut Graph<'_>, name: &str, bits: ImageId, side: u32, words: u32) -> ImageId {
@@ -216,7 +268,7 @@ fn add_pyramid(graph: &mut Graph<'_>, name: &str, bits: ImageId, side: u32, word
     pass.record(move |ctx| {
         let shader = &spirv::OCCLUSION_TEXTURES_ANY_BASE_COMP;
         let bindings = [
-            Bind::sampled(0, bits, SamplerDesc::nearest()).array(),
+            Bind::sampled(0, bits, SamplerDesc::nearest()),
             Bind::storage_image(1, written).part(part),
         ];
         let pipeline = ComputePipelineDesc {

@@ -92,7 +92,7 @@ pub(super) fn add_visibility<'f>(
             Bind::storage_image(7, visibility),
             Bind::uniform(8, list.arguments),
             Bind::sampled(9, list.tiles, nearest),
-            Bind::sampled(10, slices.bits, nearest).array(),
+            Bind::sampled(10, slices.bits, nearest),
             Bind::uniform(11, slices.planes),
         ];
         let pipeline = ComputePipelineDesc {

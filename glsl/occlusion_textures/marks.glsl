@@ -1,4 +1,6 @@
 // Which of the 32 slices of a pass a fragment lies in: one channel each, blended by maximum.
+#include "occlusion_textures/slice_of.glsl"
+
 layout(location = 0) out vec4 slices_0;
 layout(location = 1) out vec4 slices_1;
 layout(location = 2) out vec4 slices_2;
@@ -8,20 +10,13 @@ layout(location = 5) out vec4 slices_5;
 layout(location = 6) out vec4 slices_6;
 layout(location = 7) out vec4 slices_7;
 
-float slice_of(float z, vec4 range) {
-    float linear = (z - range.x) / (range.y - range.x);
-    float inverse = linear * range.y / max(z, 0.5 * range.x);
-    float place = range.z > 0.0 ? mix(linear, inverse, range.z) : linear;
-    return clamp(floor(place * range.w), 0.0, range.w - 1.0);
-}
-
 vec4 channels(float slice, float first) {
     return vec4(equal(vec4(slice - first), vec4(0.0, 1.0, 2.0, 3.0)));
 }
 
 void write_slice(float z, vec4 range, uint first_slice) {
-    // Beyond the last plane nothing can block a receiver.
-    float slice = z > range.y ? -1.0 : slice_of(z, range) - float(first_slice);
+    float place = slice_of(z, range);
+    float slice = place < 0.0 ? -1.0 : place - float(first_slice);
     slices_0 = channels(slice, 0.0);
     slices_1 = channels(slice, 4.0);
     slices_2 = channels(slice, 8.0);

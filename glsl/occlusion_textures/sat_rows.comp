@@ -1,6 +1,6 @@
 #version 460
-// Sums along rows of what each group blocks, and of what it blocks together with all groups nearer
-// to the light: the first half of their summed-area tables (Crow 1984). Whole numbers throughout,
+// Sums along rows of what each group blocks (or adds to what nearer ones block), and of what it
+// blocks together with all groups nearer to the light: the first half of their summed-area tables (Crow 1984). Whole numbers throughout,
 // so sums of boxes are exact even where they wrap.
 
 #include "occlusion_textures/groups.glsl"
@@ -10,6 +10,7 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const int WORDS = 1;
 layout(constant_id = 1) const int FINER = 1;     // texels of the bits across a texel of the table
 layout(constant_id = 2) const uint PACKED = 1u;  // both sums in one word
+layout(constant_id = 3) const uint ADDED = 1u;   // of a group only what no nearer one blocks
 
 layout(set = 0, binding = 0) uniform usampler2D bits;
 layout(set = 0, binding = 1, std140) uniform GroupBlock {
@@ -53,6 +54,7 @@ void main() {
     for (uint group = 0u; group < first; ++group) {
         prefix |= groups.masks[group];
     }
+    uvec4 before_first = prefix;
     uint count = min(BATCH, groups.count.x - first);
     for (uint i = 0u; i < BATCH; ++i) {
         masks[i] = i < count ? groups.masks[first + i] : uvec4(0u);
@@ -68,8 +70,14 @@ void main() {
         for (int sub = 0; sub < FINER * FINER; ++sub) {
             ivec2 place = FINER * ivec2(x, row) + ivec2(sub % FINER, sub / FINER);
             uvec4 found = texelFetch(bits, place, 0);
-            own += hits(found, masks[0], masks[1], masks[2], masks[3]);
-            nearer += hits(found, prefixes[0], prefixes[1], prefixes[2], prefixes[3]);
+            uvec4 all = hits(found, prefixes[0], prefixes[1], prefixes[2], prefixes[3]);
+            nearer += all;
+            if (ADDED != 0u) {
+                uint before = uint((found & before_first) != uvec4(0u));
+                own += all - uvec4(before, all.xyz);
+            } else {
+                own += hits(found, masks[0], masks[1], masks[2], masks[3]);
+            }
         }
         ivec2 place = ivec2(x + 1, row + 1);
         for (uint i = 0u; i < count; ++i) {

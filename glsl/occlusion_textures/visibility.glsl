@@ -29,7 +29,8 @@ const uint COMBINE_PRODUCT = 0u;
 const uint COMBINE_SUM = 1u;
 const uint COMBINE_MAXIMUM = 2u;
 const uint COMBINE_THIN = 3u; // a product; the groups' masks overlap
-const uint COMBINE_CUMULATIVE = 4u;
+const uint COMBINE_CUMULATIVE = 4u; // textures hold what a group adds
+const uint COMBINE_BOUNDED = 5u;    // and no more than passes any one
 
 layout(set = 0, binding = 0, std140) uniform ViewBlock {
     ViewParams view;
@@ -221,6 +222,9 @@ float through_slices(Receiver at) {
         }
         vec2 mean = blocked(group, kernel);
         if (COMBINE == COMBINE_CUMULATIVE) {
+            float open = 1.0 - mean.y + mean.x;
+            product *= open > 0.0 ? 1.0 - fade * min(mean.x / open, 1.0) : 1.0;
+        } else if (COMBINE == COMBINE_BOUNDED) {
             float before = anything_nearer ? blocked_before(group, kernel) : 0.0;
             float all_blocked = anything_nearer ? mean.y : mean.x;
             float factor = before < 1.0 ? (1.0 - all_blocked) / (1.0 - before) : 1.0;

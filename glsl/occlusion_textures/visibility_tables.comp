@@ -33,7 +33,7 @@ vec2 blocked(uint group, Kernel kernel) {
         return sums_over(group, kernel);
     }
     float own = sums_over(2u * group, kernel).x;
-    return vec2(own, COMBINE == COMBINE_CUMULATIVE ? sums_over(2u * group + 1u, kernel).x : own);
+    return vec2(own, COMBINE >= COMBINE_CUMULATIVE ? sums_over(2u * group + 1u, kernel).x : own);
 }
 
 float blocked_before(uint group, Kernel kernel) {

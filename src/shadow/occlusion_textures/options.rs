@@ -29,8 +29,10 @@ pub enum Combine {
     /// A product, with each texture filled into the next one too: the published fix for thin
     /// occluders.
     Thin,
-    /// Product of what each adds to those before it, and no more than passes any one.
+    /// Product of what each adds to those nearer to the light.
     Cumulative,
+    /// The same, and no more than passes any one.
+    Bounded,
 }
 
 /// How planes lie in the casters' depth range.
@@ -122,7 +124,8 @@ impl OcclusionOptions {
         option(
             "combine",
             "cumulative",
-            "cumulative, product, sum, maximum or thin (product, each texture filled into the next)",
+            "cumulative (by what each adds), bounded (and no more than passes any one), product, sum, \
+             maximum or thin (product, each texture filled into the next)",
             "how textures are combined",
         ),
         option(
@@ -189,6 +192,7 @@ impl OcclusionOptions {
             Combine::Maximum => "maximum",
             Combine::Thin => "thin",
             Combine::Cumulative => "cumulative",
+            Combine::Bounded => "bounded",
         };
         let planes = match self.planes {
             Planes::Uniform => "uniform",
@@ -247,6 +251,7 @@ impl OcclusionOptions {
                     "maximum" => Combine::Maximum,
                     "thin" => Combine::Thin,
                     "cumulative" => Combine::Cumulative,
+                    "bounded" => Combine::Bounded,
                     _ => return None,
                 }
             }

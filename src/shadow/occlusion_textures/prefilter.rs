@@ -1,6 +1,6 @@
 //! Filtering occlusion textures ahead of the pixels.
 
-use super::options::{Filter, OcclusionOptions};
+use super::options::{Combine, Filter, OcclusionOptions};
 use super::slices::Slices;
 use super::{NAME, ShadowInputs};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
@@ -51,6 +51,7 @@ fn add_tables(
         (0, options.words()),
         (1, options.detail),
         (2, u32::from(packed)),
+        (3, u32::from(options.combine == Combine::Cumulative)),
     ];
     let (bits, groups) = (slices.bits, slices.groups);
     let most_groups = options.slices;
@@ -130,7 +131,10 @@ fn add_averages(
     };
     let averages = graph.create_image(format!("{NAME}.averages {name}"), desc);
     let (bits, groups) = (slices.bits, slices.groups);
-    let constants = vec![(0, options.words()), (1, options.detail)];
+    let constants = vec![
+        (1, options.detail),
+        (3, u32::from(options.combine == Combine::Cumulative)),
+    ];
     let mut pass = graph.pass(format!("{NAME}.averages {name}.0"), PassKind::Compute);
     pass.read(bits, Access::Sampled(Stage::Compute));
     pass.read(groups, Access::Uniform(Stage::Compute));

@@ -49,6 +49,7 @@ pub(super) fn add_visibility<'f>(
         Combine::Maximum => 2,
         Combine::Thin => 3,
         Combine::Cumulative => 4,
+        Combine::Bounded => 5,
     };
     let mut constants = vec![
         (0, shape_number(&light.shape)),

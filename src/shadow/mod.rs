@@ -4,6 +4,7 @@ pub mod hard;
 mod light_params;
 mod light_view;
 mod map;
+pub mod mdi;
 pub mod occlusion_textures;
 pub mod oess;
 pub mod pcss;

@@ -2,6 +2,7 @@
 //!
 //! A new technique adds its module, one variant here with its arms, and its folder of shaders.
 
+use super::mdi::{self, MdiOptions};
 use super::occlusion_textures::{self, OcclusionOptions};
 use super::oess::{self, OessOptions};
 use super::pcss::PcssOptions;
@@ -21,6 +22,8 @@ pub enum Technique {
     Pcss(PcssOptions),
     /// Slices of the scene as textures, averaged over what the light covers of them.
     OcclusionTextures(OcclusionOptions),
+    /// Rays through a multi-layer depth image.
+    Mdi(MdiOptions),
     /// Edges that divide a line light into a part that is seen and one that is not.
     Oess(OessOptions),
 }
@@ -119,6 +122,7 @@ impl Technique {
         }),
         Self::Pcss(PcssOptions::DEFAULT),
         Self::OcclusionTextures(OcclusionOptions::DEFAULT),
+        Self::Mdi(MdiOptions::DEFAULT),
         Self::Oess(OessOptions::DEFAULT),
     ];
 
@@ -129,6 +133,7 @@ impl Technique {
             Self::Pcf(_) => "pcf",
             Self::Pcss(_) => "pcss",
             Self::OcclusionTextures(_) => occlusion_textures::NAME,
+            Self::Mdi(_) => mdi::NAME,
             Self::Oess(_) => oess::NAME,
         }
     }
@@ -143,6 +148,9 @@ impl Technique {
             }
             Self::OcclusionTextures(_) => {
                 "slices of the scene, each averaged over what the light covers of it"
+            }
+            Self::Mdi(_) => {
+                "all surfaces at each texel of a view, in depth buckets, crossed by rays"
             }
             Self::Oess(_) => {
                 "edges seen from both ends of a line light, which hide a part of it from each surface"
@@ -163,6 +171,10 @@ impl Technique {
                 "E. Eisemann, X. Decoret: Plausible Image Based Soft Shadows Using Occlusion \
                  Textures. SIBGRAPI 2006"
             }
+            Self::Mdi(_) => {
+                "B. Keating, N. Max: Shadow Penumbras for Complex Objects by Depth-Dependent \
+                 Filtering of Multi-Layer Depth Images. Eurographics Workshop on Rendering 1999"
+            }
             Self::Oess(_) => "C. L. Reimann, B. Dreier: Occluding Edges Soft Shadows",
         })
     }
@@ -170,7 +182,7 @@ impl Technique {
     /// Light shapes that it can do.
     pub fn shapes(self) -> &'static [ShapeKind] {
         match self {
-            Self::Hard | Self::Pcf(_) | Self::Pcss(_) => &ShapeKind::ALL,
+            Self::Hard | Self::Pcf(_) | Self::Pcss(_) | Self::Mdi(_) => &ShapeKind::ALL,
             Self::OcclusionTextures(_) => occlusion_textures::SHAPES,
             Self::Oess(_) => oess::SHAPES,
         }
@@ -183,6 +195,7 @@ impl Technique {
             Self::Pcf(_) => &[TAPS, RADIUS, PATTERN],
             Self::Pcss(_) => &[TAPS, SEARCH, PATTERN],
             Self::OcclusionTextures(_) => OcclusionOptions::ALL,
+            Self::Mdi(_) => MdiOptions::ALL,
             Self::Oess(_) => OessOptions::ALL,
         }
     }
@@ -195,6 +208,7 @@ impl Technique {
             Self::Pcf(o) => vec![o.taps.to_string(), o.radius.to_string(), pattern(o)],
             Self::Pcss(o) => vec![o.taps.to_string(), o.search.to_string(), pattern(o)],
             Self::OcclusionTextures(o) => o.values(),
+            Self::Mdi(o) => o.values(),
             Self::Oess(o) => o.values(),
         };
         let names = self.options().iter().map(|option| option.name);
@@ -206,6 +220,7 @@ impl Technique {
         let count = || value.parse::<u32>().ok().filter(|n| (1..=256).contains(n));
         match (self, option) {
             (Self::OcclusionTextures(o), _) => o.set(option, value)?,
+            (Self::Mdi(o), _) => o.set(option, value)?,
             (Self::Oess(o), _) => o.set(option, value)?,
             (Self::Pcf(o) | Self::Pcss(o), "taps") => o.taps = count()?,
             (Self::Pcss(o), "search") => o.search = count()?,
@@ -249,6 +264,7 @@ impl Technique {
             Self::OcclusionTextures(options) => {
                 occlusion_textures::add_passes(graph, inputs, options)
             }
+            Self::Mdi(options) => mdi::add_passes(graph, inputs, options),
             Self::Oess(options) => oess::add_passes(graph, inputs, options),
             Self::Pcf(options) | Self::Pcss(options) => {
                 pcss::add_passes(graph, inputs, self.name(), options)

@@ -1,0 +1,36 @@
+#version 460
+// Where the list of each texel begins, and how long it is. Lists that there is no room for are
+// empty: which ones follows from the counts alone. Their texels are left with the masks.
+
+#include "mdi/params.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(set = 0, binding = 0, std140) uniform MdiBlock {
+    MdiParams params;
+};
+layout(set = 0, binding = 1) uniform usampler2DArray counts;
+layout(set = 0, binding = 2) uniform usampler2D sums;
+layout(set = 0, binding = 3, rg32ui) uniform writeonly uimage2DArray heads;
+
+const uint NO_LIST = 0xFFFFFFFFu;
+
+void main() {
+    ivec3 size = textureSize(counts, 0);
+    int row = int(gl_GlobalInvocationID.x);
+    int view = int(gl_GlobalInvocationID.y);
+    if (row >= size.y) {
+        return;
+    }
+    uint begin = 0u;
+    for (int i = 0; i < view * size.y + row; ++i) {
+        begin += texelFetch(sums, ivec2(i % size.y, i / size.y), 0).x;
+    }
+    for (int x = 0; x < size.x; ++x) {
+        uint count = texelFetch(counts, ivec3(x, row, view), 0).x;
+        bool fits = begin + count <= params.counts.z;
+        uvec2 head = fits ? uvec2(begin, count) : uvec2(NO_LIST, 0u);
+        imageStore(heads, ivec3(x, row, view), uvec4(head, 0u, 0u));
+        begin += count;
+    }
+}

@@ -1,0 +1,312 @@
+//! The multi-layer depth image: for each texel a mask of buckets and a sorted list of depths.
+
+use super::options::{Buckets, MdiOptions};
+use super::views::MdiViews;
+use super::{NAME, ShadowInputs};
+use crate::gpu::{ComputePipelineDesc, SamplerDesc, Shader, spirv};
+use crate::graph::{
+    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, ImagePart, PassKind, Stage,
+};
+use ash::vk;
+
+/// Width of the image of lists: `LIST_WIDTH` in `mdi/params.glsl`.
+const LIST_WIDTH: u32 = 4096;
+/// Most workgroups in one direction of a dispatch.
+const MOST_GROUPS: u32 = 32_768;
+
+/// The image of all views.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layers {
+    /// `MdiParams`: a uniform buffer.
+    pub params: BufferId,
+    /// `RayBlock`: a uniform buffer.
+    pub rays: BufferId,
+    /// R32_UINT with mip levels, `words` layers a view: boundaries that are blocked.
+    pub boundaries: ImageId,
+    /// RG32_UINT, a layer a view: where a texel's list begins, and its length.
+    pub heads: ImageId,
+    /// R32_UINT: depths, as bits of floats.
+    pub lists: ImageId,
+}
+
+/// Specialization constants of `mdi/params.glsl`.
+pub(super) fn bucket_constants(options: &MdiOptions, sun: bool) -> Vec<(u32, u32)> {
+    let reciprocal = options.spacing == Buckets::Reciprocal && !sun;
+    vec![(20, options.buckets), (21, u32::from(reciprocal))]
+}
+
+pub(super) fn add_layers<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: &MdiOptions,
+    views: &MdiViews,
+) -> Layers {
+    let name = &inputs.light_name;
+    let (params, rays) = add_params(graph, name, views);
+    let count = views.count.max(1);
+    let side = if views.count > 0 {
+        options.resolution
+    } else {
+        1
+    };
+    let words = options.words();
+    let image = |format, layers| ImageDesc::new(format, side, side).layers(layers);
+    let counts = graph.create_image(
+        format!("{NAME}.counts {name}"),
+        image(vk::Format::R32_UINT, count),
+    );
+    let masks = graph.create_image(
+        format!("{NAME}.masks {name}"),
+        image(vk::Format::R32_UINT, count * words),
+    );
+    let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
+    let mut counts = pass.overwrite(counts, Access::Clear);
+    let mut masks = pass.overwrite(masks, Access::Clear);
+    pass.record(move |ctx| {
+        ctx.clear_image(counts, [0.0; 4])?;
+        ctx.clear_image(masks, [0.0; 4])
+    });
+    let coverage = Coverage {
+        params,
+        constants: {
+            let mut constants = bucket_constants(options, inputs.light.shape.is_sun());
+            constants.push((0, u32::from(inputs.scene.has_masks())));
+            constants
+        },
+        triangles: inputs.scene.triangle_count() as u32,
+    };
+    for view in 0..views.count {
+        let mut pass = graph.pass(format!("{NAME}.count {name}.{view}"), PassKind::Compute);
+        coverage.read(&mut pass, inputs);
+        counts = pass.write(counts, Access::StorageReadWrite(Stage::Compute));
+        masks = pass.write(masks, Access::StorageReadWrite(Stage::Compute));
+        let extra = vec![
+            Bind::storage_image(5, counts).array(),
+            Bind::storage_image(6, masks).array(),
+        ];
+        coverage.record(pass, inputs, &spirv::MDI_COUNT_COMP, view, extra);
+    }
+    let heads = add_heads(graph, inputs, options, params, counts, side, count);
+    let rows = (views.capacity.div_ceil(LIST_WIDTH)).max(1);
+    let mut lists = graph.create_image(
+        format!("{NAME}.lists {name}"),
+        ImageDesc::new(vk::Format::R32_UINT, LIST_WIDTH, rows),
+    );
+    for view in 0..count.min(views.count.max(1)) {
+        let mut pass = graph.pass(format!("{NAME}.fill {name}.{view}"), PassKind::Compute);
+        coverage.read(&mut pass, inputs);
+        counts = pass.write(counts, Access::StorageReadWrite(Stage::Compute));
+        pass.read(heads, Access::Sampled(Stage::Compute));
+        lists = if view == 0 {
+            pass.overwrite(lists, Access::StorageWrite(Stage::Compute))
+        } else {
+            pass.write(lists, Access::StorageWrite(Stage::Compute))
+        };
+        let extra = vec![
+            Bind::storage_image(5, counts).array(),
+            Bind::sampled(6, heads, SamplerDesc::nearest()).array(),
+            Bind::storage_image(7, lists),
+        ];
+        coverage.record(pass, inputs, &spirv::MDI_FILL_COMP, view, extra);
+    }
+    let mut pass = graph.pass(format!("{NAME}.sort {name}"), PassKind::Compute);
+    pass.read(heads, Access::Sampled(Stage::Compute));
+    let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
+    let constants = bucket_constants(options, inputs.light.shape.is_sun());
+    let pipeline = move |shader| ComputePipelineDesc {
+        constants: constants.clone(),
+        ..ComputePipelineDesc::new(shader)
+    };
+    let sorted = pipeline.clone();
+    pass.record(move |ctx| {
+        let shader = &spirv::MDI_SORT_COMP;
+        let bindings = [
+            Bind::sampled(0, heads, SamplerDesc::nearest()).array(),
+            Bind::storage_image(1, lists),
+        ];
+        ctx.bind_compute(&sorted(shader), &bindings, &[])?;
+        ctx.dispatch(shader.groups([side, side, count]));
+        Ok(())
+    });
+    let boundaries = add_pyramid(graph, name, masks, side, count * words, pipeline);
+    Layers {
+        params,
+        rays,
+        boundaries,
+        heads,
+        lists,
+    }
+}
+
+/// A pass with an invocation for each triangle.
+struct Coverage {
+    params: BufferId,
+    constants: Vec<(u32, u32)>,
+    triangles: u32,
+}
+
+impl Coverage {
+    fn read(&self, pass: &mut crate::graph::PassBuilder<'_, '_>, inputs: &ShadowInputs<'_>) {
+        pass.read(self.params, Access::Uniform(Stage::Compute));
+        pass.read(inputs.ids.triangles, Access::Sampled(Stage::Compute));
+        for image in inputs.ids.mask_images() {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+    }
+
+    fn record(
+        &self,
+        pass: crate::graph::PassBuilder<'_, '_>,
+        inputs: &ShadowInputs<'_>,
+        shader: &'static Shader,
+        view: u32,
+        extra: Vec<Bind>,
+    ) {
+        let (params, ids) = (self.params, inputs.ids);
+        let pipeline = ComputePipelineDesc {
+            constants: self.constants.clone(),
+            ..ComputePipelineDesc::new(shader)
+        };
+        let [groups, ..] = shader.groups([self.triangles, 1, 1]);
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let mut bindings = vec![
+                Bind::uniform(0, params),
+                Bind::sampled(1, ids.triangles, nearest),
+                Bind::sampled(2, ids.materials, nearest),
+                Bind::sampled(3, ids.triangle_uvs, nearest),
+                Bind::sampled(4, ids.texels, nearest),
+            ];
+            bindings.extend(extra);
+            let across = groups.clamp(1, MOST_GROUPS);
+            ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&[view, across]))?;
+            ctx.dispatch([across, groups.div_ceil(across), 1]);
+            Ok(())
+        });
+    }
+}
+
+fn add_params(graph: &mut Graph<'_>, name: &str, views: &MdiViews) -> (BufferId, BufferId) {
+    let (block, table) = (views.params, views.rays.clone());
+    let size = size_of_val(&block) as u64;
+    let params = graph.create_buffer(format!("{NAME}.params {name}"), BufferDesc { size });
+    let size = size_of_val(table.as_slice()) as u64;
+    let rays = graph.create_buffer(format!("{NAME}.rays {name}"), BufferDesc { size });
+    let mut pass = graph.pass(format!("{NAME}.params {name}"), PassKind::Transfer);
+    let params = pass.overwrite(params, Access::Clear);
+    let rays = pass.overwrite(rays, Access::Clear);
+    pass.record(move |ctx| {
+        ctx.update_buffer(params, 0, bytemuck::bytes_of(&block))?;
+        ctx.update_buffer(rays, 0, bytemuck::cast_slice(&table))
+    });
+    (params, rays)
+}
+
+fn add_heads(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    options: &MdiOptions,
+    params: BufferId,
+    counts: ImageId,
+    side: u32,
+    count: u32,
+) -> ImageId {
+    let name = &inputs.light_name;
+    let desc = ImageDesc::new(vk::Format::R32_UINT, side, count);
+    let sums = graph.create_image(format!("{NAME}.sums {name}"), desc);
+    let mut pass = graph.pass(format!("{NAME}.rows {name}"), PassKind::Compute);
+    pass.read(counts, Access::Sampled(Stage::Compute));
+    let sums = pass.overwrite(sums, Access::StorageWrite(Stage::Compute));
+    pass.record(move |ctx| {
+        let shader = &spirv::MDI_ROWS_COMP;
+        let bindings = [
+            Bind::sampled(0, counts, SamplerDesc::nearest()).array(),
+            Bind::storage_image(1, sums),
+        ];
+        ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
+        ctx.dispatch(shader.groups([side, count, 1]));
+        Ok(())
+    });
+    let desc = ImageDesc::new(vk::Format::R32G32_UINT, side, side).layers(count);
+    let heads = graph.create_image(format!("{NAME}.heads {name}"), desc);
+    let mut pass = graph.pass(format!("{NAME}.heads {name}"), PassKind::Compute);
+    pass.read(params, Access::Uniform(Stage::Compute));
+    pass.read(counts, Access::Sampled(Stage::Compute));
+    pass.read(sums, Access::Sampled(Stage::Compute));
+    let heads = pass.overwrite(heads, Access::StorageWrite(Stage::Compute));
+    let constants = bucket_constants(options, inputs.light.shape.is_sun());
+    pass.record(move |ctx| {
+        let shader = &spirv::MDI_HEADS_COMP;
+        let nearest = SamplerDesc::nearest();
+        let bindings = [
+            Bind::uniform(0, params),
+            Bind::sampled(1, counts, nearest).array(),
+            Bind::sampled(2, sums, nearest),
+            Bind::storage_image(3, heads).array(),
+        ];
+        let pipeline = ComputePipelineDesc {
+            constants,
+            ..ComputePipelineDesc::new(shader)
+        };
+        ctx.bind_compute(&pipeline, &bindings, &[])?;
+        ctx.dispatch(shader.groups([side, count, 1]));
+        Ok(())
+    });
+    heads
+}
+
+fn add_pyramid<'f>(
+    graph: &mut Graph<'f>,
+    name: &str,
+    masks: ImageId,
+    side: u32,
+    layers: u32,
+    pipeline: impl Fn(&'static Shader) -> ComputePipelineDesc + 'f,
+) -> ImageId {
+    let desc = ImageDesc::new(vk::Format::R32_UINT, side, side).layers(layers);
+    let mips = desc.max_mips();
+    let image = graph.create_image(format!("{NAME}.boundaries {name}"), desc.mips(mips));
+    let part = move |level| ImagePart {
+        base_mip: level,
+        mips: 1,
+        base_layer: 0,
+        layers,
+    };
+    let mut pass = graph.pass(format!("{NAME}.boundaries {name}.0"), PassKind::Compute);
+    pass.read(masks, Access::Sampled(Stage::Compute));
+    let mut image = pass.overwrite_part(image, part(0), Access::StorageWrite(Stage::Compute));
+    let written = image;
+    pass.record(move |ctx| {
+        let shader = &spirv::MDI_BOUNDARIES_COMP;
+        let bindings = [
+            Bind::sampled(0, masks, SamplerDesc::nearest()).array(),
+            Bind::storage_image(1, written).part(part(0)).array(),
+        ];
+        ctx.bind_compute(&pipeline(shader), &bindings, &[])?;
+        ctx.dispatch(shader.groups([side, side, layers]));
+        Ok(())
+    });
+    for level in 1..mips {
+        let mut pass = graph.pass(
+            format!("{NAME}.boundaries {name}.{level}"),
+            PassKind::Compute,
+        );
+        pass.read_part(image, part(level - 1), Access::Sampled(Stage::Compute));
+        image = pass.overwrite_part(image, part(level), Access::StorageWrite(Stage::Compute));
+        let written = image;
+        pass.record(move |ctx| {
+            let shader = &spirv::MDI_LEVEL_COMP;
+            let bindings = [
+                Bind::sampled(0, written, SamplerDesc::nearest())
+                    .part(part(level - 1))
+                    .array(),
+                Bind::storage_image(1, written).part(part(level)).array(),
+            ];
+            ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
+            let size = (side >> level).max(1);
+            ctx.dispatch(shader.groups([size, size, layers]));
+            Ok(())
+        });
+    }
+    image
+}

@@ -1,0 +1,108 @@
+//! Technique `mdi`: depth-dependent filtering of multi-layer depth images (B. Keating, N. Max,
+//! Eurographics Workshop on Rendering 1999).
+//!
+//! A view from the light's centre keeps all surfaces at each texel: a mask of the depth buckets that
+//! hold any, and a sorted list of their depths. From each pixel's surface a fan of rays goes to the
+//! light; where a ray crosses the boundary between two buckets, their bits at that texel say whether
+//! it is blocked. Where the receiver's own plane passes through these buckets, the depths in the
+//! list are compared with it instead.
+//!
+//! | pass | makes |
+//! |---|---|
+//! | `params` | views, buckets, rays |
+//! | `clear`, `count` | lengths of lists, masks of buckets |
+//! | `rows`, `heads` | where each list begins: a prefix sum |
+//! | `fill`, `sort` | the lists |
+//! | `boundaries` | masks of boundaries, and a pyramid of what any of its texels has |
+//! | `start`, `tiles` | the picture's tiles that need work |
+//! | `visibility` | visibility |
+
+mod layers;
+mod options;
+mod rays;
+mod views;
+
+pub use options::{Buckets, MdiOptions};
+
+use super::receivers::add_receivers;
+use super::{ShadowInputs, ShadowMask, shape_number};
+use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
+use crate::graph::{Access, Bind, Graph, PassKind, Stage};
+use layers::{Layers, bucket_constants};
+
+/// The technique's name.
+pub(super) const NAME: &str = "mdi";
+
+/// Declares the passes.
+pub(super) fn add_passes<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: MdiOptions,
+) -> ShadowMask {
+    let boxes: Vec<_> = (inputs.scene.draws().iter().map(|draw| draw.bounds)).collect();
+    let triangles = inputs.scene.triangle_count() as u32;
+    let views = views::mdi_views(
+        &inputs.light,
+        &inputs.receivers,
+        &boxes,
+        triangles,
+        &options,
+    );
+    let layers = layers::add_layers(graph, inputs, &options, &views);
+    add_visibility(graph, inputs, &options, &layers)
+}
+
+fn add_visibility<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: &MdiOptions,
+    layers: &Layers,
+) -> ShadowMask {
+    let name = &inputs.light_name;
+    let light = inputs.light;
+    let receivers = add_receivers(graph, inputs, NAME, views::reach(&light));
+    let list = receivers.list;
+    let gbuffer = inputs.gbuffer;
+    let layers = *layers;
+    let (view_params, part) = inputs.view_params;
+    let mut pass = graph.pass(format!("{NAME}.visibility {name}"), PassKind::Compute);
+    pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+    pass.read(layers.params, Access::Uniform(Stage::Compute));
+    pass.read(layers.rays, Access::Uniform(Stage::Compute));
+    for image in [
+        gbuffer.view_depth,
+        gbuffer.geometric_normal,
+        layers.boundaries,
+        layers.heads,
+        layers.lists,
+    ] {
+        pass.read(image, Access::Sampled(Stage::Compute));
+    }
+    list.read(&mut pass);
+    let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
+    let mut constants = bucket_constants(options, light.shape.is_sun());
+    constants.extend([(0, shape_number(&light.shape)), (1, options.rays)]);
+    pass.record(move |ctx| {
+        let nearest = SamplerDesc::nearest();
+        let bindings = [
+            Bind::uniform(0, view_params).part(part),
+            Bind::uniform(1, layers.params),
+            Bind::sampled(2, gbuffer.view_depth, nearest),
+            Bind::sampled(3, gbuffer.geometric_normal, nearest),
+            Bind::sampled(4, layers.boundaries, nearest).array(),
+            Bind::sampled(5, layers.heads, nearest).array(),
+            Bind::sampled(6, layers.lists, nearest),
+            Bind::storage_image(7, visibility),
+            Bind::uniform(8, list.arguments),
+            Bind::sampled(9, list.tiles, nearest),
+            Bind::uniform(10, layers.rays),
+        ];
+        let pipeline = ComputePipelineDesc {
+            constants,
+            ..ComputePipelineDesc::new(&spirv::MDI_VISIBILITY_COMP)
+        };
+        ctx.bind_compute(&pipeline, &bindings, &[])?;
+        list.dispatch(ctx)
+    });
+    ShadowMask::new(visibility)
+}

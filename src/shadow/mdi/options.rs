@@ -1,0 +1,119 @@
+//! Options of `mdi`.
+
+use crate::shadow::TechniqueOption;
+
+/// How buckets lie in the casters' depth range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Buckets {
+    /// Evenly: as published.
+    Uniform,
+    /// Evenly in 1 / depth; of a sun as [`Buckets::Uniform`].
+    Reciprocal,
+}
+
+/// Options of `mdi`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MdiOptions {
+    /// Texels across and down each view's image, 64 to 2048, a multiple of 64.
+    pub resolution: u32,
+    /// Depth buckets: 32, 64 or 128.
+    pub buckets: u32,
+    /// How they lie.
+    pub spacing: Buckets,
+    /// Rays a pixel, 4 to 256.
+    pub rays: u32,
+    /// Depths that the lists have room for, per texel of all views on average, 1 to 64.
+    pub depths: u32,
+}
+
+impl MdiOptions {
+    /// What the technique does without options.
+    pub const DEFAULT: Self = Self {
+        resolution: 512,
+        buckets: 32,
+        spacing: Buckets::Uniform,
+        rays: 64,
+        depths: 8,
+    };
+
+    /// What can be set.
+    pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
+        option(
+            "resolution",
+            "512",
+            "64 to 2048, a multiple of 64",
+            "texels across and down each view's image",
+        ),
+        option("buckets", "32", "32, 64 or 128", "depth buckets"),
+        option(
+            "spacing",
+            "uniform",
+            "uniform or reciprocal (uniform in 1 / depth)",
+            "how buckets lie in the casters' depth range",
+        ),
+        option("rays", "64", "4 to 256", "rays a pixel"),
+        option(
+            "depths",
+            "8",
+            "1 to 64",
+            "depths that lists have room for, per texel on average",
+        ),
+    ];
+
+    /// The values, in the order of [`ALL`](Self::ALL).
+    pub(in crate::shadow) fn values(&self) -> Vec<String> {
+        let spacing = match self.spacing {
+            Buckets::Uniform => "uniform",
+            Buckets::Reciprocal => "reciprocal",
+        };
+        vec![
+            self.resolution.to_string(),
+            self.buckets.to_string(),
+            spacing.to_string(),
+            self.rays.to_string(),
+            self.depths.to_string(),
+        ]
+    }
+
+    /// Sets one; `None` for a value that it does not take.
+    pub(in crate::shadow) fn set(&mut self, option: &str, value: &str) -> Option<()> {
+        let number = |range: std::ops::RangeInclusive<u32>| {
+            value.parse::<u32>().ok().filter(|n| range.contains(n))
+        };
+        match option {
+            "resolution" => self.resolution = number(64..=2048).filter(|n| n % 64 == 0)?,
+            "buckets" => self.buckets = number(32..=128).filter(|n| n.is_power_of_two())?,
+            "spacing" => {
+                self.spacing = match value {
+                    "uniform" => Buckets::Uniform,
+                    "reciprocal" => Buckets::Reciprocal,
+                    _ => return None,
+                }
+            }
+            "rays" => self.rays = number(4..=256)?,
+            "depths" => self.depths = number(1..=64)?,
+            _ => return None,
+        }
+        Some(())
+    }
+
+    /// Words of a texel's mask.
+    pub(super) fn words(&self) -> u32 {
+        self.buckets / 32
+    }
+}
+
+const fn option(
+    name: &'static str,
+    default: &'static str,
+    values: &'static str,
+    what: &'static str,
+) -> TechniqueOption {
+    TechniqueOption {
+        name,
+        default,
+        values,
+        what,
+    }
+}

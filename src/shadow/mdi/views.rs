@@ -1,0 +1,116 @@
+//! Views of a light and the depth range of their buckets.
+
+use super::options::{Buckets, MdiOptions};
+use super::rays::{MOST_RAYS, Ray, ray_table};
+use crate::light::{AreaLight, LightShape};
+use crate::scene::Aabb;
+use crate::shadow::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+/// `MdiParams` in `mdi/params.glsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct MdiParams {
+    counts: [u32; 4],
+    origin: [f32; 4],
+    views: [LightView; MAX_LIGHT_VIEWS],
+    buckets: [[f32; 4]; MAX_LIGHT_VIEWS],
+}
+
+/// Views reach at most this far beyond the receivers, as the tangent of an angle at the light:
+/// blockers outside are missed.
+const MOST_MARGIN: f64 = 0.5;
+
+/// Nearest depth of a caster as a part of the light's reach: what is nearer is cut off.
+const NEAREST: f64 = 1.0 / 64.0;
+
+/// What the passes need.
+#[derive(Clone, Debug)]
+pub(super) struct MdiViews {
+    pub count: u32,
+    pub params: MdiParams,
+    pub rays: Vec<Ray>,
+    /// Depths that the lists have room for.
+    pub capacity: u32,
+}
+
+/// Distance from the light's centre to its farthest point, of a sun at distance 1.
+pub(super) fn reach(light: &AreaLight) -> f32 {
+    match light.shape {
+        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
+        shape => shape.bounding_radius(),
+    }
+}
+
+pub(super) fn mdi_views(
+    light: &AreaLight,
+    receivers: &[Vec<DVec3>],
+    casters: &[Aabb],
+    triangles: u32,
+    options: &MdiOptions,
+) -> MdiViews {
+    let around = casters.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
+    let sun = light.shape.is_sun();
+    let reach = f64::from(reach(light));
+    let center = light.center.as_dvec3();
+    let distance = |b: &Aabb| {
+        let nearest = light.center.clamp(b.min, b.max) - light.center;
+        f64::from(nearest.length())
+    };
+    let nearest = casters.iter().map(distance).fold(f64::INFINITY, f64::min);
+    let margin = if sun {
+        reach * f64::from(around.radius())
+    } else {
+        (reach / nearest.max(reach).max(1.0e-6)).min(MOST_MARGIN)
+    };
+    let views = light_views(light, receivers, &around, margin);
+    let count = views.views.len() as u32;
+    let size = options.resolution;
+    let capacity = options.depths * size * size * count.max(1);
+    let origin = if sun { DVec3::ZERO } else { center };
+    let mut params = MdiParams {
+        counts: [count, size, capacity, triangles],
+        origin: origin.as_vec3().extend(0.0).to_array(),
+        views: [LightView::default(); MAX_LIGHT_VIEWS],
+        buckets: [[0.0; 4]; MAX_LIGHT_VIEWS],
+    };
+    for (index, view) in views.views.iter().enumerate() {
+        params.views[index] = *view;
+        let [x, y, z, _] = view.forward.map(f64::from);
+        let forward = DVec3::new(x, y, z);
+        let corners = casters.iter().flat_map(|b| b.corners());
+        let depths = corners.map(|c| (c.as_dvec3() - origin).dot(forward));
+        let (near, far) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| {
+            (a.min(z), b.max(z))
+        });
+        let far = far.max(1.0e-6);
+        let (near, cut) = if sun {
+            (near, f64::NEG_INFINITY)
+        } else {
+            let least = (far * 1.0e-5).max(reach * NEAREST).min(0.5 * far);
+            (
+                near.max(nearest / 3.0_f64.sqrt()).clamp(least, 0.999 * far),
+                least,
+            )
+        };
+        // Nothing lies exactly on the outer boundaries.
+        let pad = 1.0e-4 * (far - near).max(1.0e-6);
+        let (near, far) = (near - if sun { pad } else { 0.0 }, far + pad);
+        let scaled = |z: f64| match options.spacing {
+            Buckets::Reciprocal if !sun => -1.0 / z,
+            _ => z,
+        };
+        let (first, last) = (scaled(near), scaled(far));
+        let width = (last - first) / f64::from(options.buckets);
+        params.buckets[index] = [first, 1.0 / width, width, cut.max(-1.0e30)].map(|v| v as f32);
+    }
+    let mut rays = ray_table(&light.shape, options.rays);
+    rays.resize(MOST_RAYS, [0.0; 4]);
+    MdiViews {
+        count,
+        params,
+        rays,
+        capacity,
+    }
+}

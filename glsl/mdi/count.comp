@@ -1,26 +1,22 @@
 #version 460
 // How many depths each texel of a view has, and in which buckets.
 
-#include "mdi/coverage.glsl"
+#include "mdi/count.glsl"
 
-layout(set = 0, binding = 5, r32ui) uniform uimage2DArray counts;
-layout(set = 0, binding = 6, r32ui) uniform uimage2DArray masks;
-
-void cover_texel(ivec2 texel, float z, float nearest, float farthest) {
-    vec4 buckets = params.buckets[push.view];
-    imageAtomicAdd(counts, ivec3(texel, push.view), 1u);
-    // A slanted surface is in every bucket that it passes within the texel, so that no ray finds a
-    // gap between it and the next texel's.
-    int first = bucket_of(bucket_place(buckets, nearest));
-    int last = bucket_of(bucket_place(buckets, farthest));
-    for (int word = first >> 5; word <= last >> 5; ++word) {
-        uint from = uint(max(first - 32 * word, 0));
-        uint to = uint(min(last - 32 * word, 31));
-        uint bits = (0xFFFFFFFFu << from) & (0xFFFFFFFFu >> (31u - to));
-        imageAtomicOr(masks, ivec3(texel, push.view * WORDS + uint(word)), bits);
-    }
-}
+layout(set = 0, binding = 7, std430) buffer Arguments {
+    LargeArguments large;
+};
+layout(set = 0, binding = 8, r32ui) uniform writeonly uimage2D large_list;
 
 void main() {
-    cover(triangle_of_invocation());
+    uint triangle = invocation_triangle();
+    if (triangle < params.counts.w) {
+        if (cover_small(triangle)) {
+            uint index = atomicAdd(large.count, 1u);
+            if (index < LARGE_GROUPS) {
+                atomicAdd(large.groups_y, 1u);
+            }
+            imageStore(large_list, list_place(index), uvec4(triangle));
+        }
+    }
 }

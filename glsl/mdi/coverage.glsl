@@ -52,23 +52,49 @@ vec3 corner_in_view(LightView light_view, vec3 v, float size) {
     return vec3(at, perspective ? 1.0 / v.z : v.z);
 }
 
-float cross_2d(vec2 a, vec2 b) {
-    return a.x * b.y - a.y * b.x;
-}
+// A triangle in texels of a view.
+struct Shape {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+    ivec2 first; // texels whose centres it may cover
+    ivec2 last;
+    bool holes;  // alpha may cut some
+};
 
-// Corners relative to the texel `base`, which keeps products small.
-void cover_triangle(uint triangle, LightView light_view, vec3 a, vec3 b, vec3 c, bool holes) {
+Shape shape_of(vec3 a, vec3 b, vec3 c, bool holes) {
     float size = float(params.counts.y);
-    bool perspective = light_view.forward.w > 0.0;
     vec2 low = min(a.xy, min(b.xy, c.xy));
     vec2 high = max(a.xy, max(b.xy, c.xy));
     // Centres of texels lie at whole numbers and a half.
     ivec2 first = ivec2(clamp(ceil(low - 0.5), 0.0, size));
     ivec2 last = ivec2(clamp(floor(high - 0.5), -1.0, size - 1.0));
+    return Shape(a, b, c, first, last, holes);
+}
+
+float cross_2d(vec2 a, vec2 b) {
+    return a.x * b.y - a.y * b.x;
+}
+
+// Narrows a row's texels to those on the inner side of an edge, but for a texel of rounding.
+void cut_row(inout ivec2 range, vec2 from, vec2 along, float y, float turn) {
+    // cross(along, (x, y) - from) * turn >= 0
+    float slope = -along.y * turn;
+    float constant = (along.x * (y - from.y) + along.y * from.x) * turn;
+    float at = clamp(-constant / slope, -1.0e6, 1.0e6);
+    range.x = slope > 0.0 ? max(range.x, int(floor(at - 0.5)) - 1) : range.x;
+    range.y = slope < 0.0 ? min(range.y, int(ceil(at - 0.5)) + 1) : range.y;
+}
+
+void cover_row(uint triangle, Shape shape, int y) {
+    vec3 a = shape.a;
+    vec3 b = shape.b;
+    vec3 c = shape.c;
     float area = cross_2d(b.xy - a.xy, c.xy - a.xy);
-    if (any(lessThan(last, first)) || area == 0.0) {
+    if (y < shape.first.y || y > shape.last.y || area == 0.0) {
         return;
     }
+    bool perspective = params.views[push.view].forward.w > 0.0;
     float turn = area > 0.0 ? 1.0 : -1.0;
     vec2 to_b = b.xy - a.xy;
     vec2 to_c = c.xy - a.xy;
@@ -78,28 +104,29 @@ void cover_triangle(uint triangle, LightView light_view, vec3 a, vec3 b, vec3 c,
     float reach = 0.5 * (abs(slope.x) + abs(slope.y));
     float least = min(a.z, min(b.z, c.z));
     float most = max(a.z, max(b.z, c.z));
-    for (int y = first.y; y <= last.y; ++y) {
-        for (int x = first.x; x <= last.x; ++x) {
-            vec2 p = vec2(x, y) + 0.5;
-            precise float u = cross_2d(c.xy - b.xy, p - b.xy) * turn;
-            precise float v = cross_2d(a.xy - c.xy, p - c.xy) * turn;
-            precise float w = cross_2d(b.xy - a.xy, p - a.xy) * turn;
-            if (u < 0.0 || v < 0.0 || w < 0.0) {
-                continue;
+    ivec2 range = ivec2(shape.first.x, shape.last.x);
+    float middle = float(y) + 0.5;
+    cut_row(range, b.xy, c.xy - b.xy, middle, turn);
+    cut_row(range, c.xy, a.xy - c.xy, middle, turn);
+    cut_row(range, a.xy, b.xy - a.xy, middle, turn);
+    for (int x = range.x; x <= range.y; ++x) {
+        vec2 p = vec2(float(x) + 0.5, middle);
+        precise float u = cross_2d(c.xy - b.xy, p - b.xy) * turn;
+        precise float v = cross_2d(a.xy - c.xy, p - c.xy) * turn;
+        precise float w = cross_2d(b.xy - a.xy, p - a.xy) * turn;
+        bool covered = u >= 0.0 && v >= 0.0 && w >= 0.0;
+        float at = clamp(a.z + dot(slope, p - a.xy), least, most);
+        if (MASKED != 0u && covered && shape.holes) {
+            vec3 weights = vec3(u, v, w) / max(abs(area), 1.0e-38);
+            if (perspective) {
+                // Weights in space from weights in the image.
+                weights *= vec3(a.z, b.z, c.z);
+                weights /= weights.x + weights.y + weights.z;
             }
-            float at = clamp(a.z + dot(slope, p - a.xy), least, most);
-            if (MASKED != 0u && holes) {
-                vec3 weights = vec3(u, v, w) / max(abs(area), 1.0e-38);
-                if (perspective) {
-                    // Weights in space from weights in the image.
-                    weights *= vec3(a.z, b.z, c.z);
-                    weights /= weights.x + weights.y + weights.z;
-                }
-                float stored = fetch_triangle_texel(4u * triangle + 3u).w;
-                if (is_hole(material_number(stored), fetch_uv(triangle, weights))) {
-                    continue;
-                }
-            }
+            float stored = fetch_triangle_texel(4u * triangle + 3u).w;
+            covered = !is_hole(material_number(stored), fetch_uv(triangle, weights));
+        }
+        if (covered) {
             float from = clamp(at - reach, least, most);
             float to = clamp(at + reach, least, most);
             vec3 z = perspective ? vec3(1.0 / at, 1.0 / to, 1.0 / from) : vec3(at, from, to);
@@ -108,57 +135,81 @@ void cover_triangle(uint triangle, LightView light_view, vec3 a, vec3 b, vec3 c,
     }
 }
 
-void cover(uint triangle) {
-    if (triangle >= params.counts.w) {
-        return;
-    }
-    LightView light_view = params.views[push.view];
-    float nearest = params.buckets[push.view].w;
-    float size = float(params.counts.y);
+// Corners along the axes of the view, metres from its origin.
+vec3[3] corners_of(uint triangle, LightView light_view) {
     vec3 v[3];
-    for (int i = 0; i < 3; ++i) {
-        vec3 p = fetch_corner(triangle, uint(i)).position - params.origin.xyz;
+    for (uint i = 0u; i < 3u; ++i) {
+        vec3 p = fetch_corner(triangle, i).position - params.origin.xyz;
         v[i] = vec3(dot(p, light_view.right.xyz), dot(p, light_view.up.xyz),
             dot(p, light_view.forward.xyz));
     }
-    bool holes = MASKED != 0u
-        && material_is_masked(fetch_triangle_texel(4u * triangle + 3u).w);
+    return v;
+}
+
+bool has_holes(uint triangle) {
+    return MASKED != 0u && material_is_masked(fetch_triangle_texel(4u * triangle + 3u).w);
+}
+
+// Texels around a triangle that one invocation looks at; larger ones have an invocation a row.
+const int MOST_TEXELS = 2048;
+
+// Covers a small triangle; true for one that is left to `cover_large`.
+bool cover_small(uint triangle) {
+    LightView light_view = params.views[push.view];
+    float nearest = params.buckets[push.view].w;
+    float size = float(params.counts.y);
+    vec3 v[3] = corners_of(triangle, light_view);
     bvec3 behind = lessThan(vec3(v[0].z, v[1].z, v[2].z), vec3(nearest));
-    if (all(behind)) {
-        return;
+    if (any(behind)) {
+        return !all(behind);
     }
-    if (!any(behind)) {
-        vec3 a = corner_in_view(light_view, v[0], size);
-        vec3 b = corner_in_view(light_view, v[1], size);
-        vec3 c = corner_in_view(light_view, v[2], size);
-        cover_triangle(triangle, light_view, a, b, c, holes);
-        return;
+    Shape shape = shape_of(corner_in_view(light_view, v[0], size),
+        corner_in_view(light_view, v[1], size), corner_in_view(light_view, v[2], size),
+        has_holes(triangle));
+    ivec2 span = max(shape.last - shape.first + 1, 0);
+    if (span.x * span.y > MOST_TEXELS) {
+        return true;
     }
-    // Turn the corners so that the odd one out is the first, and cut.
-    int odd = behind.x == behind.y ? 2 : behind.y == behind.z ? 0 : 1;
-    bool odd_behind = behind[odd];
-    vec3 a = v[odd];
-    vec3 b = v[(odd + 1) % 3];
-    vec3 c = v[(odd + 2) % 3];
+    for (int y = shape.first.y; y <= shape.last.y; ++y) {
+        cover_row(triangle, shape, y);
+    }
+    return false;
+}
+
+// Covers one row of a triangle that may reach behind the light.
+void cover_large(uint triangle, int y) {
+    LightView light_view = params.views[push.view];
+    float nearest = params.buckets[push.view].w;
+    float size = float(params.counts.y);
+    vec3 v[3] = corners_of(triangle, light_view);
+    bvec3 behind = lessThan(vec3(v[0].z, v[1].z, v[2].z), vec3(nearest));
+    // The odd one out comes first.
+    int odd = behind.x == behind.y ? 2 : behind.x == behind.z ? 1 : 0;
+    vec3 a = odd == 0 ? v[0] : odd == 1 ? v[1] : v[2];
+    vec3 b = odd == 0 ? v[1] : odd == 1 ? v[2] : v[0];
+    vec3 c = odd == 0 ? v[2] : odd == 1 ? v[0] : v[1];
+    bool cut = any(behind);
+    bool odd_behind = a.z < nearest;
+    // Holes are not looked for in cut triangles: their corners have no texture coordinates.
     vec3 ab = mix(a, b, (nearest - a.z) / (b.z - a.z));
     vec3 ac = mix(a, c, (nearest - a.z) / (c.z - a.z));
-    ab.z = nearest;
-    ac.z = nearest;
-    vec3 in_ab = corner_in_view(light_view, ab, size);
-    vec3 in_ac = corner_in_view(light_view, ac, size);
-    // Holes are not looked for in cut triangles: their corners have no texture coordinates.
-    if (odd_behind) {
-        vec3 in_b = corner_in_view(light_view, b, size);
-        vec3 in_c = corner_in_view(light_view, c, size);
-        cover_triangle(triangle, light_view, in_ab, in_b, in_c, false);
-        cover_triangle(triangle, light_view, in_ab, in_c, in_ac, false);
-    } else {
-        vec3 in_a = corner_in_view(light_view, a, size);
-        cover_triangle(triangle, light_view, in_a, in_ab, in_ac, false);
+    vec3 first = !cut ? v[0] : odd_behind ? vec3(ab.xy, nearest) : a;
+    vec3 second = !cut ? v[1] : odd_behind ? b : vec3(ab.xy, nearest);
+    vec3 third = !cut ? v[2] : odd_behind ? c : vec3(ac.xy, nearest);
+    bool holes = !cut && has_holes(triangle);
+    int parts = cut && odd_behind ? 2 : 1;
+    for (int part = 0; part < parts; ++part) {
+        Shape shape = shape_of(corner_in_view(light_view, first, size),
+            corner_in_view(light_view, second, size), corner_in_view(light_view, third, size),
+            holes);
+        cover_row(triangle, shape, y);
+        second = third;
+        third = vec3(ac.xy, nearest);
     }
 }
 
-uint triangle_of_invocation() {
+// The triangle of an invocation of `cover_small`.
+uint invocation_triangle() {
     uint group = gl_WorkGroupID.y * push.groups_across + gl_WorkGroupID.x;
     return group * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
 }

@@ -44,4 +44,15 @@ ivec2 list_place(uint index) {
     return ivec2(index % LIST_WIDTH, index / LIST_WIDTH);
 }
 
+// Arguments of a dispatch over the large triangles of a view: rows in x, triangles in y.
+struct LargeArguments {
+    uint groups_x;
+    uint groups_y;
+    uint groups_z;
+    uint count;
+};
+
+// Most workgroups in y; each takes every so many of the list.
+const uint LARGE_GROUPS = 32768u;
+
 #endif

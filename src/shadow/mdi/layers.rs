@@ -1,5 +1,6 @@
 //! The multi-layer depth image: for each texel a mask of buckets and a sorted list of depths.
 
+use super::coverage::Coverage;
 use super::options::{Buckets, MdiOptions};
 use super::views::MdiViews;
 use super::{NAME, ShadowInputs};
@@ -10,9 +11,7 @@ use crate::graph::{
 use ash::vk;
 
 /// Width of the image of lists: `LIST_WIDTH` in `mdi/params.glsl`.
-const LIST_WIDTH: u32 = 4096;
-/// Most workgroups in one direction of a dispatch.
-const MOST_GROUPS: u32 = 32_768;
+pub(super) const LIST_WIDTH: u32 = 4096;
 
 /// The image of all views.
 #[derive(Clone, Copy, Debug)]
@@ -66,48 +65,21 @@ pub(super) fn add_layers<'f>(
         ctx.clear_image(counts, [0.0; 4])?;
         ctx.clear_image(masks, [0.0; 4])
     });
-    let coverage = Coverage {
-        params,
-        constants: {
-            let mut constants = bucket_constants(options, inputs.light.shape.is_sun());
-            constants.push((0, u32::from(inputs.scene.has_masks())));
-            constants
-        },
-        triangles: inputs.scene.triangle_count() as u32,
-    };
+    let mut coverage = Coverage::new(inputs, options, params, side);
     for view in 0..views.count {
-        let mut pass = graph.pass(format!("{NAME}.count {name}.{view}"), PassKind::Compute);
-        coverage.read(&mut pass, inputs);
-        counts = pass.write(counts, Access::StorageReadWrite(Stage::Compute));
-        masks = pass.write(masks, Access::StorageReadWrite(Stage::Compute));
-        let extra = vec![
-            Bind::storage_image(5, counts).array(),
-            Bind::storage_image(6, masks).array(),
-        ];
-        coverage.record(pass, inputs, &spirv::MDI_COUNT_COMP, view, extra);
+        [counts, masks] = coverage.add_count(graph, inputs, view, [counts, masks]);
     }
     let heads = add_heads(graph, inputs, options, params, counts, side, count);
     let rows = (views.capacity.div_ceil(LIST_WIDTH)).max(1);
-    let mut lists = graph.create_image(
+    let lists = graph.create_image(
         format!("{NAME}.lists {name}"),
         ImageDesc::new(vk::Format::R32_UINT, LIST_WIDTH, rows),
     );
-    for view in 0..count.min(views.count.max(1)) {
-        let mut pass = graph.pass(format!("{NAME}.fill {name}.{view}"), PassKind::Compute);
-        coverage.read(&mut pass, inputs);
-        counts = pass.write(counts, Access::StorageReadWrite(Stage::Compute));
-        pass.read(heads, Access::Sampled(Stage::Compute));
-        lists = if view == 0 {
-            pass.overwrite(lists, Access::StorageWrite(Stage::Compute))
-        } else {
-            pass.write(lists, Access::StorageWrite(Stage::Compute))
-        };
-        let extra = vec![
-            Bind::storage_image(5, counts).array(),
-            Bind::sampled(6, heads, SamplerDesc::nearest()).array(),
-            Bind::storage_image(7, lists),
-        ];
-        coverage.record(pass, inputs, &spirv::MDI_FILL_COMP, view, extra);
+    let mut pass = graph.pass(format!("{NAME}.empty {name}"), PassKind::Transfer);
+    let mut lists = pass.overwrite(lists, Access::Clear);
+    pass.record(move |ctx| ctx.clear_image(lists, [0.0; 4]));
+    for view in 0..views.count {
+        [counts, lists] = coverage.add_fill(graph, inputs, view, [counts, lists], heads);
     }
     let mut pass = graph.pass(format!("{NAME}.sort {name}"), PassKind::Compute);
     pass.read(heads, Access::Sampled(Stage::Compute));
@@ -135,54 +107,6 @@ pub(super) fn add_layers<'f>(
         boundaries,
         heads,
         lists,
-    }
-}
-
-/// A pass with an invocation for each triangle.
-struct Coverage {
-    params: BufferId,
-    constants: Vec<(u32, u32)>,
-    triangles: u32,
-}
-
-impl Coverage {
-    fn read(&self, pass: &mut crate::graph::PassBuilder<'_, '_>, inputs: &ShadowInputs<'_>) {
-        pass.read(self.params, Access::Uniform(Stage::Compute));
-        pass.read(inputs.ids.triangles, Access::Sampled(Stage::Compute));
-        for image in inputs.ids.mask_images() {
-            pass.read(image, Access::Sampled(Stage::Compute));
-        }
-    }
-
-    fn record(
-        &self,
-        pass: crate::graph::PassBuilder<'_, '_>,
-        inputs: &ShadowInputs<'_>,
-        shader: &'static Shader,
-        view: u32,
-        extra: Vec<Bind>,
-    ) {
-        let (params, ids) = (self.params, inputs.ids);
-        let pipeline = ComputePipelineDesc {
-            constants: self.constants.clone(),
-            ..ComputePipelineDesc::new(shader)
-        };
-        let [groups, ..] = shader.groups([self.triangles, 1, 1]);
-        pass.record(move |ctx| {
-            let nearest = SamplerDesc::nearest();
-            let mut bindings = vec![
-                Bind::uniform(0, params),
-                Bind::sampled(1, ids.triangles, nearest),
-                Bind::sampled(2, ids.materials, nearest),
-                Bind::sampled(3, ids.triangle_uvs, nearest),
-                Bind::sampled(4, ids.texels, nearest),
-            ];
-            bindings.extend(extra);
-            let across = groups.clamp(1, MOST_GROUPS);
-            ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&[view, across]))?;
-            ctx.dispatch([across, groups.div_ceil(across), 1]);
-            Ok(())
-        });
     }
 }
 

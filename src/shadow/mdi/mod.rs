@@ -17,6 +17,7 @@
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
 
+mod coverage;
 mod layers;
 mod options;
 mod rays;

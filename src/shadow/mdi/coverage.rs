@@ -1,0 +1,188 @@
+//! Passes over all triangles: small ones with an invocation each, large ones with one for each row.
+
+use super::layers::{LIST_WIDTH, bucket_constants};
+use super::options::MdiOptions;
+use super::{NAME, ShadowInputs};
+use crate::gpu::{ComputePipelineDesc, SamplerDesc, Shader, spirv};
+use crate::graph::{
+    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassBuilder, PassKind, Stage,
+};
+use ash::vk;
+
+/// Most workgroups in one direction of a dispatch.
+const MOST_GROUPS: u32 = 32_768;
+
+/// What the passes of all views share.
+pub(super) struct Coverage {
+    params: BufferId,
+    constants: Vec<(u32, u32)>,
+    triangles: u32,
+    side: u32,
+    /// The large triangles of each view.
+    large: Vec<Large>,
+}
+
+/// A list of triangles, and the arguments of a dispatch over it.
+#[derive(Clone, Copy)]
+struct Large {
+    arguments: BufferId,
+    list: ImageId,
+}
+
+impl Coverage {
+    pub(super) fn new(
+        inputs: &ShadowInputs<'_>,
+        options: &MdiOptions,
+        params: BufferId,
+        side: u32,
+    ) -> Self {
+        let mut constants = bucket_constants(options, inputs.light.shape.is_sun());
+        constants.push((0, u32::from(inputs.scene.has_masks())));
+        Self {
+            params,
+            constants,
+            triangles: inputs.scene.triangle_count() as u32,
+            side,
+            large: Vec::new(),
+        }
+    }
+
+    /// Counts depths and marks buckets of a view; the images are the counts and the masks.
+    pub(super) fn add_count(
+        &mut self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        view: u32,
+        [mut counts, mut masks]: [ImageId; 2],
+    ) -> [ImageId; 2] {
+        let name = format!("{}.{view}", inputs.light_name);
+        let arguments =
+            graph.create_buffer(format!("{NAME}.arguments {name}"), BufferDesc { size: 16 });
+        let rows = self.triangles.div_ceil(LIST_WIDTH).max(1);
+        let desc = ImageDesc::new(vk::Format::R32_UINT, LIST_WIDTH, rows);
+        let list = graph.create_image(format!("{NAME}.large {name}"), desc);
+        let groups = self.side.div_ceil(64);
+        let mut pass = graph.pass(format!("{NAME}.start_count {name}"), PassKind::Transfer);
+        let arguments = pass.overwrite(arguments, Access::Clear);
+        pass.record(move |ctx| {
+            ctx.update_buffer(arguments, 0, bytemuck::cast_slice(&[groups, 0, 1, 0]))
+        });
+        let mut pass = graph.pass(format!("{NAME}.count {name}"), PassKind::Compute);
+        self.read(&mut pass, inputs);
+        let storage = Access::StorageReadWrite(Stage::Compute);
+        counts = pass.write(counts, storage);
+        masks = pass.write(masks, storage);
+        let arguments = pass.write(arguments, storage);
+        let list = pass.overwrite(list, Access::StorageWrite(Stage::Compute));
+        let images = [
+            Bind::storage_image(5, counts).array(),
+            Bind::storage_image(6, masks).array(),
+        ];
+        let mut bindings = images.to_vec();
+        bindings.push(Bind::storage_buffer(7, arguments));
+        bindings.push(Bind::storage_image(8, list));
+        self.record(pass, inputs, (&spirv::MDI_COUNT_COMP, bindings), view, None);
+
+        let large = Large { arguments, list };
+        self.large.push(large);
+        let mut pass = graph.pass(format!("{NAME}.count_large {name}"), PassKind::Compute);
+        self.read(&mut pass, inputs);
+        counts = pass.write(counts, storage);
+        masks = pass.write(masks, storage);
+        let shader = &spirv::MDI_COUNT_LARGE_COMP;
+        let bindings = vec![
+            Bind::storage_image(5, counts).array(),
+            Bind::storage_image(6, masks).array(),
+        ];
+        large.read(&mut pass);
+        self.record(pass, inputs, (shader, bindings), view, Some(large));
+        [counts, masks]
+    }
+
+    /// Fills the lists of a view; the images are the counts, which end as 0, and the lists.
+    pub(super) fn add_fill(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        view: u32,
+        [mut counts, mut lists]: [ImageId; 2],
+        heads: ImageId,
+    ) -> [ImageId; 2] {
+        let large = self.large[view as usize];
+        for (shader, what, large) in [
+            (&spirv::MDI_FILL_COMP, "fill", None),
+            (&spirv::MDI_FILL_LARGE_COMP, "fill_large", Some(large)),
+        ] {
+            let name = format!("{NAME}.{what} {}.{view}", inputs.light_name);
+            let mut pass = graph.pass(name, PassKind::Compute);
+            self.read(&mut pass, inputs);
+            counts = pass.write(counts, Access::StorageReadWrite(Stage::Compute));
+            pass.read(heads, Access::Sampled(Stage::Compute));
+            lists = pass.write(lists, Access::StorageWrite(Stage::Compute));
+            if let Some(large) = large {
+                large.read(&mut pass);
+            }
+            let bindings = vec![
+                Bind::storage_image(5, counts).array(),
+                Bind::sampled(6, heads, SamplerDesc::nearest()).array(),
+                Bind::storage_image(7, lists),
+            ];
+            self.record(pass, inputs, (shader, bindings), view, large);
+        }
+        [counts, lists]
+    }
+
+    fn read(&self, pass: &mut PassBuilder<'_, '_>, inputs: &ShadowInputs<'_>) {
+        pass.read(self.params, Access::Uniform(Stage::Compute));
+        pass.read(inputs.ids.triangles, Access::Sampled(Stage::Compute));
+        for image in inputs.ids.mask_images() {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+    }
+
+    fn record(
+        &self,
+        pass: PassBuilder<'_, '_>,
+        inputs: &ShadowInputs<'_>,
+        (shader, extra): (&'static Shader, Vec<Bind>),
+        view: u32,
+        large: Option<Large>,
+    ) {
+        let (params, ids) = (self.params, inputs.ids);
+        let pipeline = ComputePipelineDesc {
+            constants: self.constants.clone(),
+            ..ComputePipelineDesc::new(shader)
+        };
+        let [groups, ..] = shader.groups([self.triangles, 1, 1]);
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let mut bindings = vec![
+                Bind::uniform(0, params),
+                Bind::sampled(1, ids.triangles, nearest),
+                Bind::sampled(2, ids.materials, nearest),
+                Bind::sampled(3, ids.triangle_uvs, nearest),
+                Bind::sampled(4, ids.texels, nearest),
+            ];
+            bindings.extend(extra);
+            let across = groups.clamp(1, MOST_GROUPS);
+            let push = [view, across];
+            let Some(large) = large else {
+                ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
+                ctx.dispatch([across, groups.div_ceil(across), 1]);
+                return Ok(());
+            };
+            bindings.push(Bind::uniform(8, large.arguments));
+            bindings.push(Bind::sampled(9, large.list, nearest));
+            ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
+            ctx.dispatch_indirect(large.arguments, 0)
+        });
+    }
+}
+
+impl Large {
+    fn read(&self, pass: &mut PassBuilder<'_, '_>) {
+        pass.read(self.arguments, Access::Indirect);
+        pass.read(self.arguments, Access::Uniform(Stage::Compute));
+        pass.read(self.list, Access::Sampled(Stage::Compute));
+    }
+}

@@ -60,16 +60,17 @@ struct Shape {
     ivec2 first; // texels whose centres it may cover
     ivec2 last;
     bool holes;  // alpha may cut some
+    vec4 plane;  // xyz: unit normal along the axes of the view, w: dot product with any point
 };
 
-Shape shape_of(vec3 a, vec3 b, vec3 c, bool holes) {
+Shape shape_of(vec3 a, vec3 b, vec3 c, bool holes, vec4 plane) {
     float size = float(params.counts.y);
     vec2 low = min(a.xy, min(b.xy, c.xy));
     vec2 high = max(a.xy, max(b.xy, c.xy));
     // Centres of texels lie at whole numbers and a half.
     ivec2 first = ivec2(clamp(ceil(low - 0.5), 0.0, size));
     ivec2 last = ivec2(clamp(floor(high - 0.5), -1.0, size - 1.0));
-    return Shape(a, b, c, first, last, holes);
+    return Shape(a, b, c, first, last, holes, plane);
 }
 
 float cross_2d(vec2 a, vec2 b) {
@@ -94,13 +95,14 @@ void cover_row(uint triangle, Shape shape, int y) {
     if (y < shape.first.y || y > shape.last.y || area == 0.0) {
         return;
     }
-    bool perspective = params.views[push.view].forward.w > 0.0;
     float turn = area > 0.0 ? 1.0 : -1.0;
-    vec2 to_b = b.xy - a.xy;
-    vec2 to_c = c.xy - a.xy;
-    // The gradient of depth in texels.
-    vec2 slope = vec2((b.z - a.z) * to_c.y - (c.z - a.z) * to_b.y,
-        (c.z - a.z) * to_b.x - (b.z - a.z) * to_c.x) / area;
+    // The plane rather than the corners: those of a large triangle round off its depths.
+    LightView light_view = params.views[push.view];
+    bool perspective = light_view.forward.w > 0.0;
+    vec2 scale = light_view.scale.xy * float(params.counts.y);
+    vec2 corner = vec2(light_view.right.w, light_view.up.w);
+    vec4 plane = shape.plane;
+    vec2 slope = (perspective ? plane.xy / plane.w : -plane.xy / plane.z) / scale;
     float reach = 0.5 * (abs(slope.x) + abs(slope.y));
     float least = min(a.z, min(b.z, c.z));
     float most = max(a.z, max(b.z, c.z));
@@ -115,7 +117,9 @@ void cover_row(uint triangle, Shape shape, int y) {
         precise float v = cross_2d(a.xy - c.xy, p - c.xy) * turn;
         precise float w = cross_2d(b.xy - a.xy, p - a.xy) * turn;
         bool covered = u >= 0.0 && v >= 0.0 && w >= 0.0;
-        float at = clamp(a.z + dot(slope, p - a.xy), least, most);
+        float across = dot(plane.xy, p / scale + corner);
+        float at = perspective ? (across + plane.z) / plane.w : (plane.w - across) / plane.z;
+        at = clamp(at, least, most);
         if (MASKED != 0u && covered && shape.holes) {
             vec3 weights = vec3(u, v, w) / max(abs(area), 1.0e-38);
             if (perspective) {
@@ -146,6 +150,13 @@ vec3[3] corners_of(uint triangle, LightView light_view) {
     return v;
 }
 
+vec4 plane_of(uint triangle, LightView light_view, vec3 point) {
+    vec3 n = fetch_geometric_normal(triangle);
+    n = vec3(dot(n, light_view.right.xyz), dot(n, light_view.up.xyz),
+        dot(n, light_view.forward.xyz));
+    return vec4(n, dot(n, point));
+}
+
 bool has_holes(uint triangle) {
     return MASKED != 0u && material_is_masked(fetch_triangle_texel(4u * triangle + 3u).w);
 }
@@ -165,7 +176,7 @@ bool cover_small(uint triangle) {
     }
     Shape shape = shape_of(corner_in_view(light_view, v[0], size),
         corner_in_view(light_view, v[1], size), corner_in_view(light_view, v[2], size),
-        has_holes(triangle));
+        has_holes(triangle), plane_of(triangle, light_view, v[0]));
     ivec2 span = max(shape.last - shape.first + 1, 0);
     if (span.x * span.y > MOST_TEXELS) {
         return true;
@@ -197,11 +208,12 @@ void cover_large(uint triangle, int y) {
     vec3 second = !cut ? v[1] : odd_behind ? b : vec3(ab.xy, nearest);
     vec3 third = !cut ? v[2] : odd_behind ? c : vec3(ac.xy, nearest);
     bool holes = !cut && has_holes(triangle);
+    vec4 plane = plane_of(triangle, light_view, v[0]);
     int parts = cut && odd_behind ? 2 : 1;
     for (int part = 0; part < parts; ++part) {
         Shape shape = shape_of(corner_in_view(light_view, first, size),
             corner_in_view(light_view, second, size), corner_in_view(light_view, third, size),
-            holes);
+            holes, plane);
         cover_row(triangle, shape, y);
         second = third;
         third = vec3(ac.xy, nearest);

@@ -87,27 +87,29 @@ uint blocked_in(Receiver receiver, int word, vec2 low, vec2 high) {
     return bits | texelFetch(boundaries, ivec3(last.x, first.y, layer), level).x;
 }
 
-// Depth of the receiver's plane along the view at the centre of a texel, metres.
-float plane_depth(Receiver receiver, vec2 texel) {
+// Depth of the receiver's plane along the view at the centre of a texel, metres, and what rounding
+// of positions and normals may move it by.
+vec2 plane_depth(Receiver receiver, vec2 texel) {
     LightView light_view = receiver.light_view;
     vec2 corner = vec2(light_view.right.w, light_view.up.w);
     vec2 at = (texel + 0.5) / float(params.counts.y) / light_view.scale.xy + corner;
     float height = dot(receiver.normal, receiver.position);
     float across = dot(receiver.normal.xy, at);
-    return light_view.forward.w > 0.0
-        ? height / (across + receiver.normal.z)
-        : (height - across) / receiver.normal.z;
+    bool perspective = light_view.forward.w > 0.0;
+    float facing = perspective ? across + receiver.normal.z : receiver.normal.z;
+    float depth = perspective ? height / facing : (height - across) / facing;
+    float size = length(receiver.position) + length(at) * (perspective ? abs(depth) : 1.0);
+    return vec2(depth, (size + abs(depth)) * DEPTH_ROUNDING / max(abs(facing), 1.0e-6));
 }
 
 // Whether a depth of the buckets around a boundary is in front of the receiver's plane.
-bool depths_block(Receiver receiver, ivec2 texel, int k, float plane) {
+bool depths_block(Receiver receiver, ivec2 texel, int k, vec2 plane) {
     uvec2 head = texelFetch(heads, ivec3(texel, receiver.index), 0).xy;
-    float slack = abs(plane) * DEPTH_ROUNDING * 8.0;
     bool blocked = false;
     for (uint i = 0u; i < head.y && !blocked; ++i) {
         float z = uintBitsToFloat(texelFetch(lists, list_place(head.x + i), 0).x);
         int bucket = bucket_of(bucket_place(receiver.buckets, z));
-        if (bucket > k || z >= plane - slack) {
+        if (bucket > k || z >= plane.x - plane.y) {
             break;
         }
         blocked = bucket >= k - 1;
@@ -127,12 +129,12 @@ bool blocked_at(Receiver receiver, vec2 slope, int k, float z) {
         return false;
     }
     // Behind the boundary's farther bucket the receiver's plane can be disregarded.
-    float plane = plane_depth(receiver, texel);
-    float half_texel = 1.0;
-    vec2 neighbours = vec2(plane_depth(receiver, texel + vec2(half_texel, 0.0)),
-        plane_depth(receiver, texel + vec2(0.0, half_texel)));
-    float reach = 0.5 * (abs(neighbours.x - plane) + abs(neighbours.y - plane));
-    bool clear = plane > 0.0 && bucket_place(receiver.buckets, plane - reach) > float(k + 1) + 0.001;
+    vec2 plane = plane_depth(receiver, texel);
+    vec2 neighbours = vec2(plane_depth(receiver, texel + vec2(1.0, 0.0)).x,
+        plane_depth(receiver, texel + vec2(0.0, 1.0)).x);
+    float reach = 0.5 * (abs(neighbours.x - plane.x) + abs(neighbours.y - plane.x)) + plane.y;
+    bool clear = plane.x > 0.0
+        && bucket_place(receiver.buckets, plane.x - reach) > float(k + 1) + 0.001;
     return clear || depths_block(receiver, place.xy, k, plane);
 }
 

@@ -30,8 +30,8 @@ pub struct MdiOptions {
 impl MdiOptions {
     /// What the technique does without options.
     pub const DEFAULT: Self = Self {
-        resolution: 512,
-        buckets: 32,
+        resolution: 1024,
+        buckets: 128,
         spacing: Buckets::Uniform,
         rays: 64,
         depths: 8,
@@ -41,11 +41,11 @@ impl MdiOptions {
     pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
         option(
             "resolution",
-            "512",
+            "1024",
             "64 to 2048, a multiple of 64",
             "texels across and down each view's image",
         ),
-        option("buckets", "32", "32, 64 or 128", "depth buckets"),
+        option("buckets", "128", "32, 64 or 128", "depth buckets"),
         option(
             "spacing",
             "uniform",

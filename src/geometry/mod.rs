@@ -10,6 +10,7 @@
 mod camera;
 mod draw;
 mod gbuffer;
+mod hierarchy;
 mod scene_buffers;
 mod scene_layout;
 mod tiles;

@@ -1,5 +1,6 @@
 //! The scene on the device: vertices and indices to draw, triangles and materials to look up.
 
+use super::hierarchy;
 use super::scene_layout::{IMAGE_WIDTH, Layout, Vertex};
 use crate::gpu::{
     Buffer, Gpu, GpuError, Image, ImageSpec, MemoryLocation, OptionalFeatures, Retired,
@@ -72,8 +73,8 @@ pub struct SceneBuffers {
 
 /// Number of buffers: vertices, texture coordinates of masked ones, indices.
 const BUFFERS: usize = 3;
-/// Number of images: triangles, texture coordinates, materials, texels.
-const IMAGES: usize = 4;
+/// Number of images: triangles, texture coordinates, materials, texels, hierarchy.
+const IMAGES: usize = 5;
 
 #[derive(Debug)]
 struct DeviceBuffers {
@@ -104,6 +105,8 @@ pub struct SceneIds {
     pub materials: ImageId,
     /// Texels of all textures: `common/materials.glsl`.
     pub texels: ImageId,
+    /// Bounding volume hierarchy of the triangles: `common/hierarchy.glsl`.
+    pub hierarchy: ImageId,
 }
 
 impl SceneIds {
@@ -122,7 +125,7 @@ impl SceneBuffers {
         scene: &Scene,
     ) -> Result<Self, UploadError> {
         let most_rows = gpu.info().limits.max_image_dimension2_d as usize;
-        let most = most_rows * IMAGE_WIDTH / 4;
+        let most = (most_rows * IMAGE_WIDTH / 4).min(hierarchy::MOST_TRIANGLES);
         let triangles = scene.triangle_count();
         if triangles > most {
             return Err(UploadError::TooManyTriangles { triangles, most });
@@ -159,6 +162,7 @@ impl SceneBuffers {
         let buffer = |bytes: usize, usage: vk::BufferUsageFlags| (bytes.max(4) as u64, usage);
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
+        let nodes = hierarchy::node_count(layout.indices.len() / 3);
         Self {
             device: None,
             sizes: Sizes {
@@ -175,6 +179,7 @@ impl SceneBuffers {
                     image(floats, layout.triangle_uvs.len()),
                     image(floats, layout.materials.len()),
                     image(vk::Format::R8G8B8A8_SRGB, layout.texels.len()),
+                    image(floats, hierarchy::NODE_TEXELS * nodes),
                 ],
             },
             draws: layout.draws.clone(),
@@ -240,6 +245,7 @@ impl SceneBuffers {
             made.buffers.push(buffer);
             uploaded?;
         }
+        let nodes = hierarchy::nodes(&layout.triangles);
         let images: [(&str, &[u8]); IMAGES] = [
             ("scene triangles", bytemuck::cast_slice(&layout.triangles)),
             (
@@ -248,6 +254,7 @@ impl SceneBuffers {
             ),
             ("scene materials", bytemuck::cast_slice(&layout.materials)),
             ("scene texels", bytemuck::cast_slice(&layout.texels)),
+            ("scene hierarchy", bytemuck::cast_slice(&nodes)),
         ];
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         for ((name, bytes), desc) in images.into_iter().zip(self.sizes.images) {
@@ -303,6 +310,11 @@ impl SceneBuffers {
     /// Number of triangles with area.
     pub fn triangle_count(&self) -> usize {
         self.triangles
+    }
+
+    /// Number of nodes of the hierarchy.
+    pub fn node_count(&self) -> usize {
+        hierarchy::node_count(self.triangles)
     }
 
     /// Whether any triangle has holes.
@@ -391,6 +403,7 @@ impl SceneBuffers {
             triangle_uvs: image("scene.triangle_uvs", 1),
             materials: image("scene.materials", 2),
             texels: image("scene.texels", 3),
+            hierarchy: image("scene.hierarchy", 4),
         }
     }
 }

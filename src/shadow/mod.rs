@@ -9,6 +9,7 @@ pub mod occlusion_textures;
 pub mod oess;
 pub mod pcss;
 mod receivers;
+pub mod shaft_masks;
 mod technique;
 
 pub use light_params::{LightParams, ViewParams, shape_number};

@@ -6,6 +6,7 @@ use super::mdi::{self, MdiOptions};
 use super::occlusion_textures::{self, OcclusionOptions};
 use super::oess::{self, OessOptions};
 use super::pcss::PcssOptions;
+use super::shaft_masks::{self, ShaftOptions};
 use super::{ShadowInputs, ShadowMask, hard, pcss};
 use crate::graph::Graph;
 use crate::light::{AreaLight, ShapeKind};
@@ -26,6 +27,8 @@ pub enum Technique {
     Mdi(MdiOptions),
     /// Edges that divide a line light into a part that is seen and one that is not.
     Oess(OessOptions),
+    /// Masks of light samples, from lists of the triangles between each tile and the light.
+    ShaftMasks(ShaftOptions),
 }
 
 /// One option of a technique.
@@ -124,6 +127,7 @@ impl Technique {
         Self::OcclusionTextures(OcclusionOptions::DEFAULT),
         Self::Mdi(MdiOptions::DEFAULT),
         Self::Oess(OessOptions::DEFAULT),
+        Self::ShaftMasks(ShaftOptions::DEFAULT),
     ];
 
     /// The name on the command line and in reports.
@@ -135,6 +139,7 @@ impl Technique {
             Self::OcclusionTextures(_) => occlusion_textures::NAME,
             Self::Mdi(_) => mdi::NAME,
             Self::Oess(_) => oess::NAME,
+            Self::ShaftMasks(_) => shaft_masks::NAME,
         }
     }
 
@@ -154,6 +159,9 @@ impl Technique {
             }
             Self::Oess(_) => {
                 "edges seen from both ends of a line light, which hide a part of it from each surface"
+            }
+            Self::ShaftMasks(_) => {
+                "light samples that the triangles between each tile and the light hide, exactly"
             }
         }
     }
@@ -176,13 +184,16 @@ impl Technique {
                  Filtering of Multi-Layer Depth Images. Eurographics Workshop on Rendering 1999"
             }
             Self::Oess(_) => "C. L. Reimann, B. Dreier: Occluding Edges Soft Shadows",
+            Self::ShaftMasks(_) => return None,
         })
     }
 
     /// Light shapes that it can do.
     pub fn shapes(self) -> &'static [ShapeKind] {
         match self {
-            Self::Hard | Self::Pcf(_) | Self::Pcss(_) | Self::Mdi(_) => &ShapeKind::ALL,
+            Self::Hard | Self::Pcf(_) | Self::Pcss(_) | Self::Mdi(_) | Self::ShaftMasks(_) => {
+                &ShapeKind::ALL
+            }
             Self::OcclusionTextures(_) => occlusion_textures::SHAPES,
             Self::Oess(_) => oess::SHAPES,
         }
@@ -197,6 +208,7 @@ impl Technique {
             Self::OcclusionTextures(_) => OcclusionOptions::ALL,
             Self::Mdi(_) => MdiOptions::ALL,
             Self::Oess(_) => OessOptions::ALL,
+            Self::ShaftMasks(_) => ShaftOptions::ALL,
         }
     }
 
@@ -210,6 +222,7 @@ impl Technique {
             Self::OcclusionTextures(o) => o.values(),
             Self::Mdi(o) => o.values(),
             Self::Oess(o) => o.values(),
+            Self::ShaftMasks(o) => o.values(),
         };
         let names = self.options().iter().map(|option| option.name);
         names.zip(values).collect()
@@ -222,6 +235,7 @@ impl Technique {
             (Self::OcclusionTextures(o), _) => o.set(option, value)?,
             (Self::Mdi(o), _) => o.set(option, value)?,
             (Self::Oess(o), _) => o.set(option, value)?,
+            (Self::ShaftMasks(o), _) => o.set(option, value)?,
             (Self::Pcf(o) | Self::Pcss(o), "taps") => o.taps = count()?,
             (Self::Pcss(o), "search") => o.search = count()?,
             (Self::Pcf(o), "radius") => {
@@ -266,6 +280,7 @@ impl Technique {
             }
             Self::Mdi(options) => mdi::add_passes(graph, inputs, options),
             Self::Oess(options) => oess::add_passes(graph, inputs, options),
+            Self::ShaftMasks(options) => shaft_masks::add_passes(graph, inputs, options),
             Self::Pcf(options) | Self::Pcss(options) => {
                 pcss::add_passes(graph, inputs, self.name(), options)
             }

@@ -1,0 +1,18 @@
+// Uniform block of the passes of shaft-masks.
+#ifndef ANTUMBRA_SHAFT_MASKS_PARAMS_GLSL
+#define ANTUMBRA_SHAFT_MASKS_PARAMS_GLSL
+
+layout(constant_id = 0) const uint LIGHT_SHAPE = 0u;
+
+// Samples of the light lie in rows along its first axis.
+const uint MOST_ROWS = 32u;
+
+struct ShaftParams {
+    uvec4 counts; // width and height of the picture in pixels, nodes, chunks of the pool of lists
+    // Of each row its place along the second axis, -1 to 1. Where x is the place along the first one,
+    // -1 to 1, samples stand at the whole columns plus 0.5 of y x + z, of a sun of
+    // y x / sqrt(w + (tangent of half its angle * x)^2) + z.
+    vec4 rows[MOST_ROWS];
+};
+
+#endif

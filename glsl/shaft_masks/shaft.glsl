@@ -1,0 +1,88 @@
+// The shaft of a tile: a convex body that holds every segment from the tile's surfaces to the light, as
+// half-spaces dot(plane.xyz, x) <= plane.w (Haines and Wallace 1991, "Shaft Culling for Efficient
+// Ray-Traced Radiosity"), and the box around it.
+#ifndef ANTUMBRA_SHAFT_MASKS_SHAFT_GLSL
+#define ANTUMBRA_SHAFT_MASKS_SHAFT_GLSL
+
+#include "common/camera.glsl"
+#include "common/hierarchy.glsl"
+#include "common/light.glsl"
+#include "shaft_masks/params.glsl"
+
+// Four sides, two ends, and the surfaces' own plane where they have one.
+const uint SHAFT_PLANES = 7u;
+// Texels of a tile's shaft, side by side: planes, box.
+const uint SHAFT_TEXELS = SHAFT_PLANES + 2u;
+
+// Rounding of positions, as a part of the largest coordinate: a few units of the last place. What is
+// nearer to a surface than that does not block its light.
+const float POSITION_ROUNDING = 1.0 / 2097152.0;
+
+struct Shaft {
+    vec4 planes[SHAFT_PLANES];
+    vec4 low;  // xyz: of the box; w: 1 where all of the light is above all surfaces' planes
+    vec4 high; // xyz: of the box; w: 1 where every pixel of the tile has a surface
+};
+
+vec4 fetch_shaft_texel(ivec2 place); // defined by the entry file
+
+Shaft fetch_shaft(uvec2 tile) {
+    ivec2 place = ivec2(tile.x * SHAFT_TEXELS, tile.y);
+    Shaft shaft;
+    for (uint i = 0u; i < SHAFT_PLANES; ++i) {
+        shaft.planes[i] = fetch_shaft_texel(place + ivec2(i, 0));
+    }
+    shaft.low = fetch_shaft_texel(place + ivec2(SHAFT_PLANES, 0));
+    shaft.high = fetch_shaft_texel(place + ivec2(SHAFT_PLANES + 1u, 0));
+    return shaft;
+}
+
+bool shaft_meets_box(Shaft shaft, vec3 low, vec3 high) {
+    vec3 middle = 0.5 * low + 0.5 * high;
+    vec3 half_size = 0.5 * high - 0.5 * low;
+    bool meets = all(lessThanEqual(low, shaft.high.xyz)) && all(greaterThanEqual(high, shaft.low.xyz));
+    for (uint i = 0u; i < SHAFT_PLANES; ++i) {
+        vec4 plane = shaft.planes[i];
+        meets = meets && dot(plane.xyz, middle) - dot(abs(plane.xyz), half_size) <= plane.w;
+    }
+    return meets;
+}
+
+bool shaft_meets_triangle(Shaft shaft, vec3 a, vec3 b, vec3 c) {
+    vec3 low = min(a, min(b, c));
+    vec3 high = max(a, max(b, c));
+    bool meets = all(lessThanEqual(low, shaft.high.xyz)) && all(greaterThanEqual(high, shaft.low.xyz));
+    for (uint i = 0u; i < SHAFT_PLANES; ++i) {
+        vec4 plane = shaft.planes[i];
+        float least = min(dot(plane.xyz, a), min(dot(plane.xyz, b), dot(plane.xyz, c)));
+        meets = meets && least <= plane.w;
+    }
+    return meets;
+}
+
+// Axes in which the light is held by a box: x and y along its own where it is flat, z towards the
+// surfaces, of a sun towards it. p: a surface.
+mat3 light_frame(Light light, vec3 p) {
+    vec3 z = LIGHT_SHAPE == LIGHT_SUN ? light.center.xyz : light.direction.xyz;
+    if (LIGHT_SHAPE == LIGHT_SPHERE) {
+        vec3 from = p - light.center.xyz;
+        float square = dot(from, from);
+        z = square > 0.0 ? from * inversesqrt(square) : z;
+        vec3 near = abs(dot(z, light.axis_x.xyz)) < 0.9 ? light.axis_x.xyz : light.axis_y.xyz;
+        vec3 x = normalize(near - z * dot(near, z));
+        return mat3(x, cross(z, x), z);
+    }
+    return mat3(light.axis_x.xyz, light.axis_y.xyz, z);
+}
+
+// Half the size of the light along the axes of its frame, metres; of a sun at distance 1.
+vec3 light_half_size(Light light) {
+    if (LIGHT_SHAPE == LIGHT_SPHERE) {
+        return vec3(light.axis_x.w);
+    } else if (LIGHT_SHAPE == LIGHT_LINE) {
+        return vec3(light.axis_x.w, 0.0, 0.0);
+    }
+    return vec3(light.axis_x.w, light.axis_y.w, 0.0);
+}
+
+#endif

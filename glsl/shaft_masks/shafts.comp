@@ -1,0 +1,181 @@
+#version 460
+// The shaft of each listed tile: the hull of two boxes, around its surfaces and around the light, along
+// the axes of the light. One invocation a tile: all do the same work, without barriers.
+
+#include "common/tiles.glsl"
+#include "common/view_params.glsl"
+#include "shaft_masks/shaft.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(set = 0, binding = 0, std140) uniform ViewBlock {
+    ViewParams view;
+};
+layout(set = 0, binding = 1, std140) uniform ShaftBlock {
+    ShaftParams params;
+};
+layout(set = 0, binding = 2) uniform sampler2D view_depth;
+layout(set = 0, binding = 3) uniform usampler2D ids;
+layout(set = 0, binding = 4) uniform sampler2D triangles;
+layout(set = 0, binding = 5, std140) uniform Arguments {
+    TileArguments arguments;
+};
+layout(set = 0, binding = 6) uniform usampler2D list;
+layout(set = 0, binding = 7, rgba32f) uniform writeonly image2D shafts;
+
+vec4 fetch_triangle_texel(uint texel) {
+    return texelFetch(triangles, triangle_texel_place(texel), 0);
+}
+
+// Nothing is fetched from these here.
+vec4 fetch_node_texel(ivec2 place) {
+    return vec4(0.0);
+}
+
+vec4 fetch_shaft_texel(ivec2 place) {
+    return vec4(0.0);
+}
+
+const float FAR = 1.0e38;
+// Room for rounding, as a part of the coordinates that go into a plane.
+const float SLACK = 1.0e-6;
+// Normals whose coordinates differ by less are one.
+const float SAME_NORMAL = 1.0e-6;
+
+// The side of the hull of two boxes towards +a in the plane of a and z. light: half its size along a
+// and z; near: least z of the surfaces, reach: their largest a and z. Returns the outward normal along a
+// and z and the offset.
+vec3 hull_side(vec2 light_half, float reach_a, float near_z, float far_z) {
+    if (LIGHT_SHAPE == LIGHT_SUN) {
+        float slope = light_half.x;
+        return vec3(1.0, -slope, reach_a - slope * near_z);
+    }
+    float rise = 0.5 * (near_z + far_z);
+    float run = reach_a - light_half.x;
+    // The corners that the edge runs between are both at the far or at the near side along z.
+    float side = (rise < 0.0) == (run < 0.0) ? -1.0 : 1.0;
+    rise = (side < 0.0 ? near_z : far_z) - side * light_half.y;
+    vec2 normal = rise < 0.0 ? vec2(-rise, run) : vec2(rise, -run);
+    float scale = max(abs(normal.x), abs(normal.y));
+    normal = scale > 0.0 ? normal / scale : vec2(1.0, 0.0);
+    float light = normal.x * light_half.x + abs(normal.y) * light_half.y;
+    float surfaces = normal.x * reach_a + max(normal.y * near_z, normal.y * far_z);
+    return vec3(normal, max(light, surfaces));
+}
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= arguments.count) {
+        return;
+    }
+    uvec2 size = params.counts.xy;
+    uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
+    uvec2 tile = tile_of_entry(texelFetch(list, tile_entry_place(index, tiles), 0).x, tiles);
+    Light light = view.light;
+    vec3 eye = view.camera.eye.xyz;
+
+    // A surface of the tile, for the frame.
+    vec3 some = eye;
+    mat3 frame = light_frame(light, eye);
+    if (LIGHT_SHAPE == LIGHT_SPHERE) {
+        float deepest = 0.0;
+        for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
+            uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
+            float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+            some = depth > deepest ? eye + depth * pixel_ray(view.camera, pixel) : some;
+            deepest = max(deepest, depth);
+        }
+        frame = light_frame(light, some);
+    }
+
+    // Coordinates of a sun's frame are taken from the eye, of other lights from their centre.
+    vec3 origin = LIGHT_SHAPE == LIGHT_SUN ? eye : light.center.xyz;
+    vec3 half_size = light_half_size(light);
+    vec3 light_reach = abs(frame[0]) * half_size.x + abs(frame[1]) * half_size.y
+        + abs(frame[2]) * half_size.z;
+    vec3 low = vec3(FAR);
+    vec3 high = vec3(-FAR);
+    vec3 box_low = vec3(FAR);
+    vec3 box_high = vec3(-FAR);
+    vec3 normal_low = vec3(2.0);
+    vec3 normal_high = vec3(-2.0);
+    bool all_hit = true;
+    bool above = true;
+    vec3 normal = vec3(0.0);
+    float plane_low = FAR;
+    float plane_high = -FAR;
+    for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
+        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
+        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        uint id = texelFetch(ids, ivec2(pixel), 0).x;
+        bool hit = depth > 0.0;
+        all_hit = all_hit && hit;
+        if (hit) {
+            vec3 ray = pixel_ray(view.camera, pixel);
+            vec3 p = eye + depth * ray;
+            vec3 n = fetch_geometric_normal(id - 1u);
+            n = dot(n, ray) > 0.0 ? -n : n;
+            normal = normal == vec3(0.0) ? n : normal;
+            normal_low = min(normal_low, n);
+            normal_high = max(normal_high, n);
+            plane_low = min(plane_low, dot(normal, p));
+            plane_high = max(plane_high, dot(normal, p));
+            box_low = min(box_low, p);
+            box_high = max(box_high, p);
+            vec3 q = (p - origin) * frame;
+            low = min(low, q);
+            high = max(high, q);
+            vec3 to_light = light_offset(light, p);
+            above = above && dot(n, to_light) > dot(abs(n), light_reach) + SLACK * length(to_light);
+        }
+    }
+    vec3 extent = max(max(abs(box_low), abs(box_high)), abs(eye));
+    if (LIGHT_SHAPE != LIGHT_SUN) {
+        extent = max(extent, abs(light.center.xyz) + light_reach);
+    }
+    float extent_m = max(extent.x, max(extent.y, extent.z));
+    float slack = SLACK * 4.0 * extent_m;
+    low -= slack;
+    high += slack;
+
+    vec4 planes[SHAFT_PLANES];
+    vec3 right = hull_side(half_size.xz, high.x, low.z, high.z);
+    vec3 left = hull_side(half_size.xz, -low.x, low.z, high.z);
+    vec3 up = hull_side(half_size.yz, high.y, low.z, high.z);
+    vec3 down = hull_side(half_size.yz, -low.y, low.z, high.z);
+    planes[0] = vec4(right.x * frame[0] + right.y * frame[2], right.z);
+    planes[1] = vec4(left.y * frame[2] - left.x * frame[0], left.z);
+    planes[2] = vec4(up.x * frame[1] + up.y * frame[2], up.z);
+    planes[3] = vec4(down.y * frame[2] - down.x * frame[1], down.z);
+    planes[4] = vec4(-frame[2], -(LIGHT_SHAPE == LIGHT_SUN ? low.z : min(low.z, -half_size.z)));
+    planes[5] = vec4(frame[2], max(high.z, half_size.z));
+    if (LIGHT_SHAPE == LIGHT_SUN) {
+        planes[5] = vec4(vec3(0.0), FAR);
+    }
+    for (uint i = 0u; i < 6u; ++i) {
+        planes[i].w += dot(planes[i].xyz, origin) + slack;
+    }
+    // Where all surfaces lie in one plane, what does not rise above it blocks nothing.
+    float rounding = POSITION_ROUNDING * extent_m;
+    bool flat_tile = all(lessThan(normal_high - normal_low, vec3(SAME_NORMAL)))
+        && plane_high - plane_low <= 4.0 * rounding;
+    planes[6] = flat_tile ? vec4(-normal, -plane_high - rounding) : vec4(vec3(0.0), FAR);
+
+    if (LIGHT_SHAPE == LIGHT_SUN) {
+        // A box around a cone without end has sides at most where no direction leads.
+        vec3 reach = abs(frame[0]) * half_size.x + abs(frame[1]) * half_size.y;
+        box_low = mix(box_low, vec3(-FAR), lessThan(frame[2] - reach, vec3(SLACK)));
+        box_high = mix(box_high, vec3(FAR), greaterThan(frame[2] + reach, vec3(-SLACK)));
+    } else {
+        box_low = min(box_low, light.center.xyz - light_reach);
+        box_high = max(box_high, light.center.xyz + light_reach);
+    }
+    ivec2 place = ivec2(tile.x * SHAFT_TEXELS, tile.y);
+    for (uint i = 0u; i < SHAFT_PLANES; ++i) {
+        imageStore(shafts, place + ivec2(i, 0), planes[i]);
+    }
+    vec4 first = vec4(box_low - slack, above ? 1.0 : 0.0);
+    vec4 last = vec4(box_high + slack, all_hit ? 1.0 : 0.0);
+    imageStore(shafts, place + ivec2(SHAFT_PLANES, 0), first);
+    imageStore(shafts, place + ivec2(SHAFT_PLANES + 1u, 0), last);
+}

@@ -139,6 +139,7 @@ impl<'s> FrameRenderer<'s> {
     ) -> BTreeMap<String, u64> {
         let counts = [
             ("barriers", report.barriers as u64),
+            ("edges", self.buffers.edge_count() as u64),
             ("passes", report.passes.len() as u64),
             ("passes_culled", plan.culled.len() as u64),
             ("pipelines_created", pipelines as u64),

@@ -7,6 +7,7 @@
 //! | `gbuffer.surface` | ids, triangles | view depth, geometric and shading normal |
 //! | `gbuffer.tiles` | view depth, geometric normal | bounds of each tile's surfaces |
 
+mod adjacency;
 mod camera;
 mod draw;
 mod gbuffer;
@@ -20,5 +21,6 @@ pub use camera::{PixelCamera, frustum_sees};
 pub use draw::{DrawTarget, SceneShaders, draw_scene, draw_scene_with, read_for_draw};
 pub use gbuffer::{GBuffer, add_gbuffer};
 pub use scene_buffers::{Draw, SceneBuffers, SceneIds, UploadError};
+pub use scene_layout::image_place;
 pub use tiles::{TILE_SIZE, TileList, add_tile_bounds, tile_counts};
 pub use visible::visible_hulls;

@@ -1,5 +1,6 @@
 //! The scene on the device: vertices and indices to draw, triangles and materials to look up.
 
+use super::adjacency::Adjacency;
 use super::hierarchy;
 use super::scene_layout::{IMAGE_WIDTH, Layout, Vertex};
 use crate::gpu::{
@@ -34,6 +35,14 @@ pub enum UploadError {
         /// Texels that fit.
         most: usize,
     },
+    /// More edges than the device's images hold.
+    #[error("the scene has {edges} edges; this device holds {most}")]
+    TooManyEdges {
+        /// Edges of the scene.
+        edges: usize,
+        /// Edges that fit.
+        most: usize,
+    },
     /// The device refused.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -65,6 +74,7 @@ pub struct SceneBuffers {
     bounds: Aabb,
     triangles: usize,
     degenerate: usize,
+    edges: usize,
     masked: bool,
     textured: usize,
     shiny: bool,
@@ -73,8 +83,8 @@ pub struct SceneBuffers {
 
 /// Number of buffers: vertices, texture coordinates of masked ones, indices.
 const BUFFERS: usize = 3;
-/// Number of images: triangles, texture coordinates, materials, texels, hierarchy.
-const IMAGES: usize = 5;
+/// Number of images: triangles, texture coordinates, materials, texels, hierarchy, edges, their ends.
+const IMAGES: usize = 7;
 
 #[derive(Debug)]
 struct DeviceBuffers {
@@ -107,6 +117,10 @@ pub struct SceneIds {
     pub texels: ImageId,
     /// Bounding volume hierarchy of the triangles: `common/hierarchy.glsl`.
     pub hierarchy: ImageId,
+    /// RGBA32_UINT: edges with the faces that meet there, `silhouettes/edges.glsl`.
+    pub edges: ImageId,
+    /// RGBA32F: ends of edges.
+    pub points: ImageId,
 }
 
 impl SceneIds {
@@ -135,9 +149,14 @@ impl SceneBuffers {
         if texels > most {
             return Err(UploadError::TooManyTexels { texels, most });
         }
-        let mut buffers = Self::without_device(scene, &layout);
+        let adjacency = Adjacency::new(scene);
+        let edges = adjacency.edges.len();
+        if edges > most {
+            return Err(UploadError::TooManyEdges { edges, most });
+        }
+        let mut buffers = Self::without_device(scene, &layout, &adjacency);
         let mut staging = Vec::new();
-        let device = buffers.make(gpu, cmd, &layout, &mut staging);
+        let device = buffers.make(gpu, cmd, &layout, &adjacency, &mut staging);
         for buffer in staging {
             gpu.retire(Retired::Buffer(buffer));
         }
@@ -149,10 +168,10 @@ impl SceneBuffers {
     /// A stand-in without device, for planning frames of a scene on a device with all optional
     /// features.
     pub fn plan_only(scene: &Scene) -> Self {
-        Self::without_device(scene, &Layout::new(scene))
+        Self::without_device(scene, &Layout::new(scene), &Adjacency::new(scene))
     }
 
-    fn without_device(scene: &Scene, layout: &Layout) -> Self {
+    fn without_device(scene: &Scene, layout: &Layout, adjacency: &Adjacency) -> Self {
         let image = |format: vk::Format, texels: usize| {
             let rows = texels.div_ceil(IMAGE_WIDTH).max(1) as u32;
             // Nothing to hold: a single texel, so that there is something to bind.
@@ -180,12 +199,15 @@ impl SceneBuffers {
                     image(floats, layout.materials.len()),
                     image(vk::Format::R8G8B8A8_SRGB, layout.texels.len()),
                     image(floats, hierarchy::NODE_TEXELS * nodes),
+                    image(vk::Format::R32G32B32A32_UINT, adjacency.edges.len()),
+                    image(floats, adjacency.points.len()),
                 ],
             },
             draws: layout.draws.clone(),
             bounds: scene.bounds,
             triangles: layout.indices.len() / 3,
             degenerate: layout.degenerate,
+            edges: adjacency.edge_count,
             masked: !layout.mask_uvs.is_empty(),
             textured: layout.triangle_uvs.len() / 2,
             shiny: scene
@@ -201,13 +223,14 @@ impl SceneBuffers {
         gpu: &mut Gpu,
         cmd: vk::CommandBuffer,
         layout: &Layout,
+        adjacency: &Adjacency,
         staging: &mut Vec<Buffer>,
     ) -> Result<DeviceBuffers, UploadError> {
         let mut made = DeviceBuffers {
             buffers: Vec::with_capacity(BUFFERS),
             images: Vec::with_capacity(IMAGES),
         };
-        let result = self.fill(gpu, cmd, layout, staging, &mut made);
+        let result = self.fill(gpu, cmd, layout, adjacency, staging, &mut made);
         match result {
             Ok(()) => Ok(made),
             Err(error) => {
@@ -229,6 +252,7 @@ impl SceneBuffers {
         gpu: &mut Gpu,
         cmd: vk::CommandBuffer,
         layout: &Layout,
+        adjacency: &Adjacency,
         staging: &mut Vec<Buffer>,
         made: &mut DeviceBuffers,
     ) -> Result<(), UploadError> {
@@ -255,6 +279,8 @@ impl SceneBuffers {
             ("scene materials", bytemuck::cast_slice(&layout.materials)),
             ("scene texels", bytemuck::cast_slice(&layout.texels)),
             ("scene hierarchy", bytemuck::cast_slice(&nodes)),
+            ("scene edges", bytemuck::cast_slice(&adjacency.edges)),
+            ("scene points", bytemuck::cast_slice(&adjacency.points)),
         ];
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         for ((name, bytes), desc) in images.into_iter().zip(self.sizes.images) {
@@ -325,6 +351,11 @@ impl SceneBuffers {
     /// Number of triangles without area or cut out as a whole, which are left out.
     pub fn degenerate_count(&self) -> usize {
         self.degenerate
+    }
+
+    /// Number of edges at which triangles meet or end.
+    pub fn edge_count(&self) -> usize {
+        self.edges
     }
 
     /// Number of triangles with texture coordinates, which come before all others.
@@ -404,6 +435,8 @@ impl SceneBuffers {
             materials: image("scene.materials", 2),
             texels: image("scene.texels", 3),
             hierarchy: image("scene.hierarchy", 4),
+            edges: image("scene.edges", 5),
+            points: image("scene.points", 6),
         }
     }
 }
@@ -509,7 +542,8 @@ fn upload_image(
         enter: ImageState::UNDEFINED,
         leave: ImageState {
             stages: vk::PipelineStageFlags2::from_raw(
-                vk::PipelineStageFlags2::FRAGMENT_SHADER.as_raw()
+                vk::PipelineStageFlags2::VERTEX_SHADER.as_raw()
+                    | vk::PipelineStageFlags2::FRAGMENT_SHADER.as_raw()
                     | vk::PipelineStageFlags2::COMPUTE_SHADER.as_raw(),
             ),
             access: vk::AccessFlags2::SHADER_SAMPLED_READ,

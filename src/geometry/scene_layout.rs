@@ -262,6 +262,19 @@ fn kind_of(scene: &Scene, primitive: &Primitive) -> Option<Kind> {
     }
 }
 
+/// Whether alpha cuts out all of a primitive, so that it blocks nothing.
+pub(super) fn is_cut_out(scene: &Scene, primitive: &Primitive) -> bool {
+    kind_of(scene, primitive).is_none()
+}
+
+/// Width and height in texels of an image of [`IMAGE_WIDTH`] that holds a number of things.
+pub fn image_place(count: usize) -> [u32; 2] {
+    [
+        IMAGE_WIDTH as u32,
+        count.div_ceil(IMAGE_WIDTH).max(1) as u32,
+    ]
+}
+
 /// The texels of all materials: `common/materials.glsl`.
 fn materials(scene: &Scene, rows: &[usize]) -> Vec<[f32; 4]> {
     let texels = scene.materials.iter().flat_map(|material| {

@@ -10,6 +10,7 @@ pub mod oess;
 pub mod pcss;
 mod receivers;
 pub mod shaft_masks;
+pub mod silhouettes;
 mod technique;
 
 pub use light_params::{LightParams, ViewParams, shape_number};

@@ -1,0 +1,206 @@
+//! Which triangles meet at which edges, as the device reads it.
+//!
+//! Corners at the same position are one point, so neither texture seams nor flat shading split an
+//! edge. Faces are known by their opposite corners alone: winding does not matter, and an edge may
+//! have one face (open), two, or more (non-manifold).
+//!
+//! A scene holds one moment: skins and morph targets are applied before, and corners that a seam has
+//! doubled carry the same weights, so they lie at the same position at every moment.
+
+use super::scene_layout::is_cut_out;
+use crate::scene::Scene;
+use glam::Vec3;
+use std::collections::HashMap;
+
+/// No second face: `NO_POINT` in `silhouettes/edges.glsl`.
+pub(super) const NO_POINT: u32 = u32::MAX;
+/// Marks the place of further faces: `MORE_FACES` in `silhouettes/edges.glsl`.
+const MORE_FACES: u32 = 1 << 31;
+
+/// Points and edges of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Adjacency {
+    /// Position in scene space, metres; number of the connected part that it belongs to.
+    pub points: Vec<[f32; 4]>,
+    /// First [`edge_count`](Self::edge_count) edges: both ends, then the corners opposite of the
+    /// edge in its faces. The last is [`NO_POINT`] for an open edge. For an edge of three or more
+    /// faces it is [`MORE_FACES`] plus the place in this list of further texels: three corners, and
+    /// 1 if another texel follows, else 0; corners repeat to fill it.
+    pub edges: Vec<[u32; 4]>,
+    /// Number of edges.
+    pub edge_count: usize,
+}
+
+impl Adjacency {
+    /// Finds the edges of all triangles that block light.
+    pub fn new(scene: &Scene) -> Self {
+        let mut welded: HashMap<[u32; 3], u32> = HashMap::new();
+        let mut positions: Vec<Vec3> = Vec::new();
+        let mut halves: Vec<(u64, u32)> = Vec::with_capacity(3 * scene.triangle_count());
+        for primitive in &scene.primitives {
+            if is_cut_out(scene, primitive) {
+                continue;
+            }
+            let mut point = |index: &u32| {
+                let position = primitive.positions[*index as usize];
+                // Both zeros are one place.
+                let key = (position + Vec3::ZERO).to_array().map(f32::to_bits);
+                *welded.entry(key).or_insert_with(|| {
+                    positions.push(position);
+                    positions.len() as u32 - 1
+                })
+            };
+            for corners in primitive.indices.chunks_exact(3) {
+                let [a, b, c] = [&corners[0], &corners[1], &corners[2]].map(&mut point);
+                if a == b || b == c || c == a {
+                    continue;
+                }
+                for (from, to, opposite) in [(a, b, c), (b, c, a), (c, a, b)] {
+                    let key = u64::from(from.min(to)) << 32 | u64::from(from.max(to));
+                    halves.push((key, opposite));
+                }
+            }
+        }
+        // Ordered by content: the same scene gives the same list.
+        halves.sort_unstable();
+        let parts = parts(positions.len(), &halves);
+        let points = positions.iter().zip(parts);
+        let mut found = Self {
+            points: points
+                .map(|(p, part)| p.extend(part as f32).to_array())
+                .collect(),
+            ..Self::default()
+        };
+        let edges = || halves.chunk_by(|a, b| a.0 == b.0);
+        found.edge_count = edges().count();
+        found.edges.reserve(found.edge_count);
+        let mut more: Vec<[u32; 4]> = Vec::new();
+        for faces in edges() {
+            let (key, first) = faces[0];
+            let last = match &faces[1..] {
+                [] => NO_POINT,
+                [(_, second)] => *second,
+                others => {
+                    let place = found.edge_count + more.len();
+                    let corners: Vec<u32> = others.iter().map(|(_, corner)| *corner).collect();
+                    let texels = corners.chunks(3);
+                    let count = texels.len();
+                    more.extend(texels.enumerate().map(|(i, texel)| {
+                        let at = |i: usize| texel[i.min(texel.len() - 1)];
+                        [at(0), at(1), at(2), u32::from(i + 1 < count)]
+                    }));
+                    MORE_FACES | place as u32
+                }
+            };
+            found
+                .edges
+                .push([(key >> 32) as u32, key as u32, first, last]);
+        }
+        found.edges.extend(more);
+        found
+    }
+}
+
+/// Number of the connected part of each point, in the order of first points.
+fn parts(points: usize, halves: &[(u64, u32)]) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..points as u32).collect();
+    fn root(parent: &mut [u32], mut of: u32) -> u32 {
+        while parent[of as usize] != of {
+            let above = parent[parent[of as usize] as usize];
+            parent[of as usize] = above;
+            of = above;
+        }
+        of
+    }
+    for (key, _) in halves {
+        let a = root(&mut parent, (key >> 32) as u32);
+        let b = root(&mut parent, *key as u32);
+        parent[a.max(b) as usize] = a.min(b);
+    }
+    let mut names: Vec<u32> = vec![NO_POINT; points];
+    let mut next = 0;
+    (0..points as u32)
+        .map(|point| {
+            let root = root(&mut parent, point) as usize;
+            if names[root] == NO_POINT {
+                names[root] = next;
+                next += 1;
+            }
+            names[root]
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Primitive};
+
+    fn scene(primitives: Vec<Primitive>) -> Scene {
+        Scene {
+            primitives,
+            materials: vec![Material::default()],
+            ..Scene::default()
+        }
+    }
+
+    fn mesh(positions: &[[f32; 3]], indices: &[u32]) -> Primitive {
+        Primitive {
+            normals: vec![Vec3::Y; positions.len()],
+            positions: positions.iter().map(|p| Vec3::from(*p)).collect(),
+            indices: indices.to_vec(),
+            ..Primitive::default()
+        }
+    }
+
+    const SQUARE: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+
+    #[test]
+    fn a_seam_and_two_meshes_do_not_split_an_edge() {
+        let [a, b, c, d] = SQUARE;
+        let seam = mesh(&[a, b, c, [-0.0, 0.0, 0.0], c, d], &[0, 1, 2, 3, 4, 5]);
+        let apart = vec![mesh(&[a, b, c], &[0, 1, 2]), mesh(&[c, d, a], &[0, 1, 2])];
+        for scene in [scene(vec![seam]), scene(apart)] {
+            let found = Adjacency::new(&scene);
+            assert_eq!((found.points.len(), found.edge_count), (4, 5));
+            let inner = found.edges.iter().filter(|e| e[3] != NO_POINT);
+            assert_eq!(inner.copied().collect::<Vec<_>>(), [[0, 2, 1, 3]]);
+            assert!(found.points.iter().all(|p| p[3] == 0.0));
+        }
+    }
+
+    #[test]
+    fn edges_of_many_faces_keep_them_all() {
+        let mut positions = vec![[0.0; 3], [0.0, 0.0, 1.0]];
+        let mut indices = Vec::new();
+        for face in 0..6u32 {
+            let (y, x) = (face as f32).sin_cos();
+            positions.push([x, y, 0.0]);
+            // Either winding.
+            indices.extend([face % 2, 1 - face % 2, 2 + face]);
+        }
+        let far = mesh(&[[9.0; 3], [8.0, 9.0, 9.0], [9.0, 8.0, 9.0]], &[0, 1, 2]);
+        let found = Adjacency::new(&scene(vec![mesh(&positions, &indices), far]));
+        assert_eq!(found.edge_count, 13 + 3);
+        let [a, b, first, last] = found.edges[0];
+        assert_eq!((a, b, first), (0, 1, 2));
+        assert_eq!(last, MORE_FACES | 16);
+        assert_eq!(found.edges[16..], [[3, 4, 5, 1], [6, 7, 7, 0]]);
+        assert_eq!(found.points[8][3], 1.0, "another part");
+    }
+
+    #[test]
+    fn triangles_without_three_corners_and_cut_out_ones_have_no_edges() {
+        let mut holes = scene(vec![
+            mesh(&SQUARE, &[0, 1, 1, 0, 1, 2]),
+            mesh(&SQUARE, &[0, 2, 3]),
+        ]);
+        holes.primitives[1].material = 1;
+        holes.materials.push(Material {
+            alpha_mode: crate::scene::AlphaMode::Mask { cutoff: 0.5 },
+            base_color: glam::Vec4::ZERO,
+            ..Material::default()
+        });
+        assert_eq!(Adjacency::new(&holes).edge_count, 3);
+    }
+}

@@ -45,6 +45,8 @@ struct Readme;
 pub use ash;
 
 #[cfg(feature = "cli")]
+pub mod batch;
+#[cfg(feature = "cli")]
 pub mod bench;
 pub mod capture;
 #[cfg(feature = "cli")]

@@ -7,6 +7,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::error::CliError;
+use crate::batch::Sequence;
 use crate::capture::FrameRequest;
 use crate::light::{LightOverrides, LightScale, LightSize, ShapeKind, SunAngle};
 use crate::scene::{LoadOptions, Scene, SceneCamera, SceneFile, SceneLight};
@@ -132,6 +133,25 @@ impl OpenScene {
 }
 
 impl ViewArgs {
+    /// As if a sequence's view had been asked for on the command line.
+    pub(super) fn of_sequence(sequence: &Sequence) -> Self {
+        let overrides = sequence.overrides;
+        Self {
+            scene: sequence.scene_path.clone(),
+            technique: sequence.technique,
+            size: Size(sequence.size),
+            camera: sequence.camera.clone(),
+            light: sequence.light.clone(),
+            time: sequence.start,
+            overrides: OverrideArgs {
+                light_shape: overrides.shape,
+                light_size: overrides.size,
+                light_scale: overrides.scale,
+                sun_angle: overrides.sun_angle,
+            },
+        }
+    }
+
     pub(super) fn scene_path(&self) -> &PathBuf {
         &self.scene
     }

@@ -11,11 +11,16 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 
 use clap::{Args, value_parser};
+use serde_json::{Value, json};
 
 use super::args::Size;
 use super::error::CliError;
 use super::progress::Progress;
+use super::shard::{self, ShardArgs};
 use super::{pipeline_cache, print_text};
+use crate::batch::scene_file::scenes_in;
+use crate::batch::{Cost, SceneFacts, Shard, bench_cost, run_of};
+use crate::bench::contender::Method;
 use crate::bench::results::{FailureKind, Results, ResultsError, Settings};
 use crate::bench::{Contender, GroupResult, Job, Outcome, Session, group, parse_list, report};
 use crate::capture::output::Output;
@@ -91,6 +96,9 @@ pub(super) struct BenchArgs {
     #[arg(long)]
     resume: bool,
 
+    #[command(flatten)]
+    shard: ShardArgs,
+
     /// Read one job from standard input and measure it
     #[arg(long, hide = true)]
     worker: bool,
@@ -119,8 +127,6 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 /// What ends a benchmark.
 #[derive(Debug, thiserror::Error)]
 enum BenchError {
-    #[error("{}: cannot list the scenes: {source}", path.display())]
-    Folder { path: PathBuf, source: io::Error },
     #[error("{}: cannot make the folder: {source}", path.display())]
     Create { path: PathBuf, source: io::Error },
     #[error("cannot start the program for a measurement: {0}")]
@@ -153,8 +159,14 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     }
     let contenders = parse_list(&args.techniques.join(";"));
     let contenders = contenders.map_err(|error| CliError::Usage(error.to_string()))?;
-    let jobs = jobs(args, &contenders)?;
-    let out = args.out.clone().unwrap_or_default();
+    let told = args.shard.settle()?;
+    let out = folder(args, told.as_ref().map(|(shard, _)| *shard));
+    let mut jobs = jobs(args, &contenders, &out)?;
+    let all = groups(&jobs);
+    if let Some(told) = &told {
+        jobs = jobs[run_of(&costs(args, &contenders, &jobs), told.0)].to_vec();
+        print_text(&shard::line(told, jobs.len(), "scenes and lights"))?;
+    }
     let images = out.join("images");
     let created = std::fs::create_dir_all(&images);
     created.map_err(|source| BenchError::Create {
@@ -163,6 +175,8 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     })?;
     let page = Output::File(out.join("report.html"));
     page.check()?;
+    let shard = told.map_or(Shard::WHOLE, |(shard, _)| shard);
+    Output::File(out.join("list.json")).write(&contents(shard, &all)?)?;
 
     let settings = Settings {
         techniques: labels(&contenders),
@@ -196,12 +210,55 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     judge(session.results(), session.file())
 }
 
+/// `--out`, and in it a folder for each shard of several.
+fn folder(args: &BenchArgs, shard: Option<Shard>) -> PathBuf {
+    let out = args.out.clone().unwrap_or_default();
+    match shard {
+        Some(shard) if shard != Shard::WHOLE => out.join(format!("shard-{}", shard.file_stem())),
+        _ => out,
+    }
+}
+
+/// What each job costs, estimated.
+fn costs(args: &BenchArgs, contenders: &[Contender], jobs: &[Job]) -> Vec<Cost> {
+    let techniques: Vec<_> = (contenders.iter())
+        .filter_map(|contender| match contender.method {
+            Method::Technique(technique) => Some(technique),
+            Method::Rival(..) => None,
+        })
+        .collect();
+    let rivals = contenders.len() - techniques.len();
+    let costs = jobs.iter().enumerate().map(|(at, job)| {
+        // Scenes that are no file are small.
+        let facts = SceneFacts::read(&job.scene);
+        let (size, samples, rounds) = (args.size.0, args.samples, args.repeat);
+        bench_cost(facts, size, samples, rounds, &techniques, rivals, at as u32)
+    });
+    costs.collect()
+}
+
+/// Scene and light of each job.
+fn groups(jobs: &[Job]) -> Vec<Value> {
+    let group =
+        |job: &Job| json!({ "scene": job.scene.display().to_string(), "light_index": job.light });
+    jobs.iter().map(group).collect()
+}
+
+/// `list.json`: all scenes and lights of all shards, and which shard this is.
+fn contents(shard: Shard, groups: &[Value]) -> Result<Vec<u8>, CliError> {
+    let (index, of) = (shard.index(), shard.count());
+    let json = json!({ "schema": 1, "kind": "bench", "shard": index, "of": of, "groups": groups });
+    let mut bytes = serde_json::to_vec_pretty(&json)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
 fn labels(contenders: &[Contender]) -> Vec<String> {
     contenders.iter().map(|c| c.label.clone()).collect()
 }
 
 /// One job for each light of each scene. All scenes are read before the first is measured.
-fn jobs(args: &BenchArgs, contenders: &[Contender]) -> Result<Vec<Job>, CliError> {
+fn jobs(args: &BenchArgs, contenders: &[Contender], out: &Path) -> Result<Vec<Job>, CliError> {
     let job = |scene: &Path, case: Option<usize>, light: usize, light_name: String| Job {
         scene: scene.into(),
         case,
@@ -214,7 +271,7 @@ fn jobs(args: &BenchArgs, contenders: &[Contender]) -> Result<Vec<Job>, CliError
         samples: args.samples,
         cell_seconds: args.cell_seconds,
         device: args.device.clone(),
-        out: args.out.clone().unwrap_or_default(),
+        out: out.into(),
         dead: Vec::new(),
     };
     let mut jobs: Vec<Job> = Vec::new();
@@ -237,31 +294,6 @@ fn jobs(args: &BenchArgs, contenders: &[Contender]) -> Result<Vec<Job>, CliError
         }
     }
     Ok(jobs)
-}
-
-/// A file as it is; of a folder its glTF files by name.
-fn scenes_in(path: &Path) -> Result<Vec<PathBuf>, CliError> {
-    if !path.is_dir() {
-        return Ok(vec![path.into()]);
-    }
-    let fault = |source| BenchError::Folder {
-        path: path.into(),
-        source,
-    };
-    let mut scenes = Vec::new();
-    for entry in std::fs::read_dir(path).map_err(fault)? {
-        let file = entry.map_err(fault)?.path();
-        let ending = file.extension().and_then(|ending| ending.to_str());
-        if matches!(ending, Some("glb" | "gltf")) {
-            scenes.push(file);
-        }
-    }
-    scenes.sort();
-    if scenes.is_empty() {
-        let text = format!("{}: the folder has no .glb or .gltf file", path.display());
-        return Err(CliError::Usage(text));
-    }
-    Ok(scenes)
 }
 
 /// Ends the process when it goes out of use.

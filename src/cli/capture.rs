@@ -13,10 +13,12 @@ use super::frames::{Fps, FrameRange, Timeline};
 use super::outputs;
 use super::progress::Progress;
 use super::report::{ImageEntry, Report};
+use super::shard::{self, ShardArgs};
 use super::shot::{self, Content, DumpArg, Shot, Wanted};
 use super::summary::summarize;
 use super::template::ImageTemplate;
 use super::{pipeline_cache, print_text};
+use crate::batch::{Shard, equal_frames, run_of};
 use crate::capture::output::Output;
 use crate::capture::{FrameRenderer, FrameRequest};
 use crate::gpu::{DeviceInfo, Gpu, GpuOptions};
@@ -78,6 +80,9 @@ pub(super) struct CaptureArgs {
     )]
     fps: Fps,
 
+    #[command(flatten)]
+    shard: ShardArgs,
+
     /// Timings, memory and counters as JSON; renders 2 warm-up frames first, then measures 7
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
@@ -104,7 +109,9 @@ pub(super) struct CaptureArgs {
 }
 
 pub(super) fn run(args: &CaptureArgs) -> Result<(), CliError> {
-    let timeline = Timeline::new(args.view.time(), args.frames, args.fps);
+    let Some(timeline) = timeline(args)? else {
+        return Ok(());
+    };
     let first = timeline.numbers().start;
     let named = |error: CliError| match timeline.is_sequence() {
         true => error.in_frame(first),
@@ -123,6 +130,33 @@ pub(super) fn run(args: &CaptureArgs) -> Result<(), CliError> {
     };
     job.check_outputs()?;
     job.run(view, progress)
+}
+
+/// The frames of this process; `None` if it has none of them.
+fn timeline(args: &CaptureArgs) -> Result<Option<Timeline>, CliError> {
+    let timeline = Timeline::new(args.view.time(), args.frames, args.fps);
+    if !timeline.is_sequence() {
+        return match args.shard.is_given() {
+            true => Err(CliError::Usage(
+                "a shard of one frame; give --frames A..B too".into(),
+            )),
+            false => Ok(Some(timeline)),
+        };
+    }
+    let Some(told) = args.shard.settle()? else {
+        return Ok(Some(timeline));
+    };
+    let report = args.report.as_ref().filter(|_| told.0 != Shard::WHOLE);
+    if let Some(report) = report {
+        return Err(CliError::Usage(format!(
+            "{}: every shard would write this report; use `antumbra batch`, whose reports are \
+             merged, or one shard",
+            report.display()
+        )));
+    }
+    let places = run_of(&equal_frames(timeline.numbers().len()), told.0);
+    print_text(&shard::line(&told, places.len(), "frames"))?;
+    Ok((!places.is_empty()).then(|| timeline.part(places)))
 }
 
 /// A capture whose arguments have been checked.
@@ -370,7 +404,7 @@ impl Job<'_> {
     }
 }
 
-fn driver_text(info: &DeviceInfo) -> String {
+pub(super) fn driver_text(info: &DeviceInfo) -> String {
     let parts = [&info.name, &info.driver_name, &info.driver_info];
     let parts: Vec<&str> = parts
         .into_iter()

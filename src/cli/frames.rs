@@ -75,6 +75,16 @@ impl Timeline {
         self.range.map_or(0..1, |range| range.first..range.end)
     }
 
+    /// The same with the frames at those places alone, counted from the first.
+    pub(super) fn part(self, places: Range<usize>) -> Self {
+        let first = self.numbers().start;
+        // Places are within a range of 32-bit numbers.
+        let at = |place: usize| first + place as u32;
+        let (first, end) = (at(places.start), at(places.end));
+        let range = Some(FrameRange { first, end });
+        Self { range, ..self }
+    }
+
     /// True if frames were asked for by number.
     pub(super) fn is_sequence(&self) -> bool {
         self.range.is_some()
@@ -131,6 +141,8 @@ mod tests {
         let line = Timeline::new(0.5, Some(frames), Fps(4.0));
         let times: Vec<f64> = line.numbers().map(|n| line.time(n)).collect();
         assert_eq!(times, [1.25, 1.5]);
+        let part = line.part(1..2);
+        assert_eq!((part.numbers(), part.time(4)), (4..5, 1.5));
         let one = Timeline::new(0.5, None, Fps(30.0));
         assert_eq!((one.numbers(), one.time(0)), (0..1, 0.5));
     }

@@ -4,6 +4,8 @@
 //! at hand, 143 ended by SIGTERM. Every failure prints exactly one line, `error: ..`, to standard error.
 
 mod args;
+mod batch;
+mod batch_run;
 mod bench;
 mod capture;
 mod compare;
@@ -16,6 +18,7 @@ mod pipeline_cache;
 mod progress;
 mod reference;
 mod report;
+mod shard;
 mod shot;
 mod signals;
 mod summary;
@@ -38,6 +41,7 @@ Examples:
   antumbra capture scene.glb --visibility vis.exr --light lamp --light-size 0.5
   antumbra capture scene.glb -o walk_{frame:04}.png --frames 0..48 --fps 24
   antumbra graph scene.glb --format dot | dot -Tsvg -o frame.svg
+  antumbra batch jobs.toml --out results --shard 3/32
   antumbra info
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 143 ended by SIGTERM.";
@@ -59,6 +63,7 @@ enum Command {
     Reference(Box<reference::ReferenceArgs>),
     Compare(compare::CompareArgs),
     Bench(Box<bench::BenchArgs>),
+    Batch(batch::BatchArgs),
 }
 
 /// Runs the program with `arguments`, of which the first is its own name, and returns its exit
@@ -74,6 +79,7 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
             Command::Reference(args) => reference::run(&args),
             Command::Compare(args) => compare::run(&args),
             Command::Bench(args) => bench::run(&args),
+            Command::Batch(args) => batch::run(&args),
         },
         Err(error) => match error.kind() {
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {

@@ -146,6 +146,22 @@ impl SceneFile {
         Self::read(path.as_ref(), &bytes, options)
     }
 
+    /// The JSON of a file's `bytes`, which `path` names in messages. It is not parsed.
+    ///
+    /// # Errors
+    /// [`SceneError::NotGltf`].
+    pub fn json_of<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8], SceneError> {
+        Ok(container::split(Source { path }, bytes)?.json)
+    }
+
+    /// The whole content of a file that the scene at `path` names by `uri`.
+    ///
+    /// # Errors
+    /// It cannot be read, or lies outside the folder of the scene.
+    pub fn read_named(path: &Path, uri: &str) -> std::io::Result<Vec<u8>> {
+        buffers::read_uri(path, uri, u64::MAX)
+    }
+
     fn read(path: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Self, SceneError> {
         let source = Source { path };
         let parts = container::split(source, bytes)?;

@@ -28,6 +28,9 @@ const WARM_UP_FRAMES: u32 = 2;
 /// A file aside that is older was left by a process that was killed: writing takes far less.
 const STALE: Duration = Duration::from_secs(3600);
 
+/// Files with their content, and the entries of the report.
+type Rendered = (Vec<(String, Vec<u8>)>, Vec<Value>);
+
 /// What came of the items.
 #[derive(Debug, Default)]
 pub(super) struct Counts {
@@ -187,11 +190,7 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    fn render(
-        &mut self,
-        item: &Item<'_>,
-        id: &str,
-    ) -> Result<(Vec<(String, Vec<u8>)>, Vec<Value>), CliError> {
+    fn render(&mut self, item: &Item<'_>, id: &str) -> Result<Rendered, CliError> {
         let sequence = item.sequence;
         let begun = Instant::now();
         let ready = self.show(sequence, item.frame);

@@ -118,7 +118,7 @@ fn of_slurm(
         .max(1);
     let said = format!("SLURM_ARRAY_TASK_ID={task} of {least}-{most}:{step}");
     let wrong = |what: String| ShardError::Array(format!("{said}: {what}"));
-    if !(least..=most).contains(&task) || (task - least) % step != 0 {
+    if !(least..=most).contains(&task) || !(task - least).is_multiple_of(step) {
         return Err(wrong("the task is none of the array's".into()));
     }
     let tasks = (most - least) / step + 1;

@@ -1,5 +1,6 @@
 #version 460
 // Bit k of a texel: something is in bucket k or k - 1, so that the boundary between them is blocked.
+// Masks of nearest boundaries are taken as they are.
 
 #include "mdi/params.glsl"
 
@@ -17,5 +18,6 @@ void main() {
     uint carry = place.z % int(WORDS) > 0
         ? texelFetch(masks, place - ivec3(0, 0, 1), 0).x >> 31
         : 0u;
-    imageStore(boundaries, place, uvec4(word | word << 1 | carry));
+    uint both = word | word << 1 | carry;
+    imageStore(boundaries, place, uvec4(MARK_NEAREST != 0u ? word : both));
 }

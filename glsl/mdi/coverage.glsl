@@ -167,7 +167,7 @@ const int MOST_TEXELS = 2048;
 // Covers a small triangle; true for one that is left to `cover_large`.
 bool cover_small(uint triangle) {
     LightView light_view = params.views[push.view];
-    float nearest = params.buckets[push.view].w;
+    float nearest = params.nearest[push.view].x;
     float size = float(params.counts.y);
     vec3 v[3] = corners_of(triangle, light_view);
     bvec3 behind = lessThan(vec3(v[0].z, v[1].z, v[2].z), vec3(nearest));
@@ -190,7 +190,7 @@ bool cover_small(uint triangle) {
 // Covers one row of a triangle that may reach behind the light.
 void cover_large(uint triangle, int y) {
     LightView light_view = params.views[push.view];
-    float nearest = params.buckets[push.view].w;
+    float nearest = params.nearest[push.view].x;
     float size = float(params.counts.y);
     vec3 v[3] = corners_of(triangle, light_view);
     bvec3 behind = lessThan(vec3(v[0].z, v[1].z, v[2].z), vec3(nearest));

@@ -87,23 +87,30 @@ uint blocked_in(Receiver receiver, int word, vec2 low, vec2 high) {
     return bits | texelFetch(boundaries, ivec3(last.x, first.y, layer), level).x;
 }
 
-// Depth of the receiver's plane along the view at the centre of a texel, metres, and what rounding
-// of positions and normals may move it by.
-vec2 plane_depth(Receiver receiver, vec2 texel) {
+// Depth of the receiver's plane along the view at the centre of a texel, metres; what rounding of
+// positions and normals may move it by; the nearest depth within the texel, 0 where the plane leaves
+// the view.
+vec3 plane_depth(Receiver receiver, vec2 texel) {
     LightView light_view = receiver.light_view;
     vec2 corner = vec2(light_view.right.w, light_view.up.w);
-    vec2 at = (texel + 0.5) / float(params.counts.y) / light_view.scale.xy + corner;
+    vec2 texel_size = 1.0 / (light_view.scale.xy * float(params.counts.y));
+    vec2 at = (texel + 0.5) * texel_size + corner;
     float height = dot(receiver.normal, receiver.position);
     float across = dot(receiver.normal.xy, at);
+    float reach = 0.5 * dot(abs(receiver.normal.xy), abs(texel_size));
     bool perspective = light_view.forward.w > 0.0;
     float facing = perspective ? across + receiver.normal.z : receiver.normal.z;
     float depth = perspective ? height / facing : (height - across) / facing;
     float size = length(receiver.position) + length(at) * (perspective ? abs(depth) : 1.0);
-    return vec2(depth, (size + abs(depth)) * DEPTH_ROUNDING / max(abs(facing), 1.0e-6));
+    float slack = (size + abs(depth)) * DEPTH_ROUNDING / max(abs(facing), 1.0e-6);
+    float steepest = abs(facing) + reach;
+    float nearest = perspective ? abs(height) / steepest : depth - reach / abs(facing);
+    bool inside = !perspective || height * facing > 0.0;
+    return vec3(depth, slack, inside ? nearest : -1.0e30);
 }
 
 // Whether a depth of the buckets around a boundary is in front of the receiver's plane.
-bool depths_block(Receiver receiver, ivec2 texel, int k, vec2 plane) {
+bool depths_block(Receiver receiver, ivec2 texel, int k, vec3 plane) {
     uvec2 head = texelFetch(heads, ivec3(texel, receiver.index), 0).xy;
     bool blocked = false;
     for (uint i = 0u; i < head.y && !blocked; ++i) {
@@ -112,7 +119,7 @@ bool depths_block(Receiver receiver, ivec2 texel, int k, vec2 plane) {
         if (bucket > k || z >= plane.x - plane.y) {
             break;
         }
-        blocked = bucket >= k - 1;
+        blocked = bucket >= (MARK_NEAREST != 0u ? k : k - 1);
     }
     return blocked;
 }
@@ -129,12 +136,10 @@ bool blocked_at(Receiver receiver, vec2 slope, int k, float z) {
         return false;
     }
     // Behind the boundary's farther bucket the receiver's plane can be disregarded.
-    vec2 plane = plane_depth(receiver, texel);
-    vec2 neighbours = vec2(plane_depth(receiver, texel + vec2(1.0, 0.0)).x,
-        plane_depth(receiver, texel + vec2(0.0, 1.0)).x);
-    float reach = 0.5 * (abs(neighbours.x - plane.x) + abs(neighbours.y - plane.x)) + plane.y;
-    bool clear = plane.x > 0.0
-        && bucket_place(receiver.buckets, plane.x - reach) > float(k + 1) + 0.001;
+    vec3 plane = plane_depth(receiver, texel);
+    float farthest_of_ours = float(k) + (MARK_NEAREST != 0u ? 0.501 : 1.001);
+    bool clear = plane.z > -1.0e29
+        && bucket_place(receiver.buckets, plane.z - plane.y) > farthest_of_ours;
     return clear || depths_block(receiver, place.xy, k, plane);
 }
 

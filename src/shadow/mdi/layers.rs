@@ -31,7 +31,11 @@ pub(super) struct Layers {
 /// Specialization constants of `mdi/params.glsl`.
 pub(super) fn bucket_constants(options: &MdiOptions, sun: bool) -> Vec<(u32, u32)> {
     let reciprocal = options.spacing == Buckets::Reciprocal && !sun;
-    vec![(20, options.buckets), (21, u32::from(reciprocal))]
+    vec![
+        (20, options.buckets),
+        (21, u32::from(reciprocal)),
+        (22, u32::from(options.nearest)),
+    ]
 }
 
 pub(super) fn add_layers<'f>(

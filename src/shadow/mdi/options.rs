@@ -21,6 +21,8 @@ pub struct MdiOptions {
     pub buckets: u32,
     /// How they lie.
     pub spacing: Buckets,
+    /// A surface blocks rays at the boundary nearest to it, not at both ends of its bucket.
+    pub nearest: bool,
     /// Rays a pixel, 4 to 256.
     pub rays: u32,
     /// Depths that the lists have room for, per texel of all views on average, 1 to 64.
@@ -32,7 +34,8 @@ impl MdiOptions {
     pub const DEFAULT: Self = Self {
         resolution: 1024,
         buckets: 128,
-        spacing: Buckets::Uniform,
+        spacing: Buckets::Reciprocal,
+        nearest: true,
         rays: 64,
         depths: 8,
     };
@@ -48,9 +51,15 @@ impl MdiOptions {
         option("buckets", "128", "32, 64 or 128", "depth buckets"),
         option(
             "spacing",
-            "uniform",
-            "uniform or reciprocal (uniform in 1 / depth)",
+            "reciprocal",
+            "uniform or reciprocal (uniform in 1 / depth, but not thinner than a part of the thickest)",
             "how buckets lie in the casters' depth range",
+        ),
+        option(
+            "marks",
+            "nearest",
+            "nearest or both",
+            "ends of a bucket where its surfaces block rays",
         ),
         option("rays", "64", "4 to 256", "rays a pixel"),
         option(
@@ -71,6 +80,7 @@ impl MdiOptions {
             self.resolution.to_string(),
             self.buckets.to_string(),
             spacing.to_string(),
+            if self.nearest { "nearest" } else { "both" }.to_string(),
             self.rays.to_string(),
             self.depths.to_string(),
         ]
@@ -88,6 +98,13 @@ impl MdiOptions {
                 self.spacing = match value {
                     "uniform" => Buckets::Uniform,
                     "reciprocal" => Buckets::Reciprocal,
+                    _ => return None,
+                }
+            }
+            "marks" => {
+                self.nearest = match value {
+                    "nearest" => true,
+                    "both" => false,
                     _ => return None,
                 }
             }

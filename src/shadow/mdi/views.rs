@@ -16,6 +16,7 @@ pub(super) struct MdiParams {
     origin: [f32; 4],
     views: [LightView; MAX_LIGHT_VIEWS],
     buckets: [[f32; 4]; MAX_LIGHT_VIEWS],
+    nearest: [[f32; 4]; MAX_LIGHT_VIEWS],
 }
 
 /// Views reach at most this far beyond the receivers, as the tangent of an angle at the light:
@@ -24,6 +25,9 @@ const MOST_MARGIN: f64 = 0.5;
 
 /// Nearest depth of a caster as a part of the light's reach: what is nearer is cut off.
 const NEAREST: f64 = 1.0 / 64.0;
+
+/// Most that the thickest bucket is as thick as the thinnest, the square of this.
+const MOST_RATIO: f64 = 8.0;
 
 /// What the passes need.
 #[derive(Clone, Debug)]
@@ -74,6 +78,7 @@ pub(super) fn mdi_views(
         origin: origin.as_vec3().extend(0.0).to_array(),
         views: [LightView::default(); MAX_LIGHT_VIEWS],
         buckets: [[0.0; 4]; MAX_LIGHT_VIEWS],
+        nearest: [[0.0; 4]; MAX_LIGHT_VIEWS],
     };
     for (index, view) in views.views.iter().enumerate() {
         params.views[index] = *view;
@@ -97,13 +102,18 @@ pub(super) fn mdi_views(
         // Nothing lies exactly on the outer boundaries.
         let pad = 1.0e-4 * (far - near).max(1.0e-6);
         let (near, far) = (near - if sun { pad } else { 0.0 }, far + pad);
+        // Buckets of equal 1 / (depth + shift): the nearest would be too thin without the shift.
+        let shift = ((far - MOST_RATIO * near) / (MOST_RATIO - 1.0)).max(0.0);
         let scaled = |z: f64| match options.spacing {
-            Buckets::Reciprocal if !sun => -1.0 / z,
+            Buckets::Reciprocal if !sun => -1.0 / (z + shift),
             _ => z,
         };
         let (first, last) = (scaled(near), scaled(far));
-        let width = (last - first) / f64::from(options.buckets);
-        params.buckets[index] = [first, 1.0 / width, width, cut.max(-1.0e30)].map(|v| v as f32);
+        // Of nearest boundaries the last one is at the far end.
+        let intervals = options.buckets - u32::from(options.nearest);
+        let width = (last - first) / f64::from(intervals);
+        params.buckets[index] = [first, 1.0 / width, width, shift].map(|v| v as f32);
+        params.nearest[index] = [cut.max(-1.0e30) as f32, 0.0, 0.0, 0.0];
     }
     let mut rays = ray_table(&light.shape, options.rays);
     rays.resize(MOST_RAYS, [0.0; 4]);

@@ -35,6 +35,11 @@ layout(set = 0, binding = 11, r32ui) uniform writeonly uimage2D pool;
 layout(set = 0, binding = 12, rgba32ui) uniform writeonly uimage2D lists;
 layout(set = 0, binding = 13, r32f) uniform writeonly image2D visibility;
 layout(set = 0, binding = 14) uniform sampler2D view_depth;
+layout(set = 0, binding = 15, std430) buffer TaskArguments {
+    TileArguments further;
+};
+// Tile, chunk and number of the first entry.
+layout(set = 0, binding = 16, rgba32ui) uniform writeonly uimage2D tasks;
 
 vec4 fetch_triangle_texel(uint texel) {
     return texelFetch(triangles, triangle_texel_place(texel), 0);
@@ -126,6 +131,12 @@ void main() {
                         found.chunk = fresh;
                     } else {
                         imageStore(pool, chunk_entry_place(chunk, CHUNK), uvec4(fresh));
+                        if (found.count % TASK_ENTRIES == 0u) {
+                            uint task = atomicAdd(further.count, 1u);
+                            atomicMax(further.groups_x, min(task + 1u, TILE_ROW));
+                            atomicMax(further.groups_y, task / TILE_ROW + 1u);
+                            imageStore(tasks, task_place(task), uvec4(entry, fresh, found.count, 0u));
+                        }
                     }
                     chunk = fresh;
                     slot = 0u;
@@ -156,6 +167,7 @@ void main() {
         atomicMax(penumbra.groups_x, min(at + 1u, TILE_ROW));
         atomicMax(penumbra.groups_y, at / TILE_ROW + 1u);
         imageStore(penumbra_list, tile_entry_place(at, tiles), uvec4(entry));
-        imageStore(lists, ivec2(tile), uvec4(found.chunk, found.count, found.resume, 0u));
     }
+    uint state = lit || dark ? TILE_SETTLED : TILE_OPEN;
+    imageStore(lists, ivec2(tile), uvec4(found.chunk, found.count, found.resume, state));
 }

@@ -1,6 +1,6 @@
 #version 460
-// Masks of the listed tiles: a workgroup a tile, four pixels an invocation, so that each fetch of a
-// triangle serves four.
+// Masks of the listed tiles, or of tasks on the rest of long lists: a workgroup each, four pixels an
+// invocation, so that each fetch of a triangle serves four.
 
 #include "common/camera.glsl"
 #include "common/tiles.glsl"
@@ -30,6 +30,12 @@ layout(set = 0, binding = 11) uniform sampler2D shafts;
 layout(set = 0, binding = 12) uniform usampler2D pool;
 layout(set = 0, binding = 13) uniform usampler2D lists;
 layout(set = 0, binding = 14, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 15) uniform usampler2D tasks;
+layout(set = 0, binding = 16, r32ui) uniform uimage2D words;
+
+layout(push_constant) uniform Push {
+    uint further; // 1 for tasks
+} push;
 
 #define SUN_TANGENT_SQUARE (view.light.axis_x.w * view.light.axis_x.w)
 
@@ -76,10 +82,25 @@ MaskReceiver fetch_receiver(uvec2 pixel, out uint blocked[ROWS]) {
     return receiver;
 }
 
-void store(uvec2 pixel, MaskReceiver receiver, uint blocked[ROWS]) {
-    // Stores beyond the picture's border are dropped.
-    float seen = receiver.id == 0u ? 1.0 : mask_visibility(blocked);
-    imageStore(visibility, ivec2(pixel), vec4(seen));
+void store(uint tile, uvec2 pixel, MaskReceiver receiver, uint blocked[ROWS], bool in_parts) {
+    if (!in_parts) {
+        // Stores beyond the picture's border are dropped.
+        float seen = receiver.id == 0u ? 1.0 : mask_visibility(blocked);
+        imageStore(visibility, ivec2(pixel), vec4(seen));
+        return;
+    }
+    for (uint word = 0u; word < WORDS; ++word) {
+        uint bits = 0u;
+        for (uint i = 0u; i < ROWS_IN_WORD; ++i) {
+            bits |= (blocked[word * ROWS_IN_WORD + i] & ALL_COLUMNS) << (i * COLUMNS);
+        }
+        ivec2 place = word_place(tile, pixel % TILE_SIZE, word);
+        if (push.further != 0u) {
+            imageAtomicOr(words, place, receiver.id == 0u ? 0u : bits);
+        } else {
+            imageStore(words, place, uvec4(receiver.id == 0u ? 0u : bits));
+        }
+    }
 }
 
 void main() {
@@ -88,7 +109,13 @@ void main() {
         return;
     }
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
-    uvec2 tile = tile_of_entry(texelFetch(list, tile_entry_place(index, tiles), 0).x, tiles);
+    uvec4 task = push.further != 0u ? texelFetch(tasks, task_place(index), 0)
+        : texelFetch(list, tile_entry_place(index, tiles), 0);
+    uvec2 tile = tile_of_entry(task.x, tiles);
+    uvec4 stored = texelFetch(lists, ivec2(tile), 0);
+    if (stored.w == TILE_SETTLED) {
+        return;
+    }
     uvec2 pixel = tile * TILE_SIZE + gl_LocalInvocationID.xy;
     uvec2 step = uvec2(0u, 2u);
     uint blocked_0[ROWS];
@@ -101,9 +128,12 @@ void main() {
     MaskReceiver receiver_3 = fetch_receiver(pixel + 3u * step, blocked_3);
 
     // First the list, then, where it is not complete, the hierarchy from there on.
-    uvec4 stored = texelFetch(lists, ivec2(tile), 0);
-    TriangleList found = TriangleList(stored.x, stored.y, stored.z);
     uint nodes = params.counts.z;
+    bool in_parts = stored.y > TASK_ENTRIES;
+    TriangleList found = TriangleList(stored.x, min(stored.y, TASK_ENTRIES), stored.z);
+    if (push.further != 0u) {
+        found = TriangleList(task.y, min(stored.y - task.z, TASK_ENTRIES), nodes);
+    }
     uint node = found.resume;
     uint slot = 0u;
     bool shaft_known = false;
@@ -143,8 +173,8 @@ void main() {
             }
         }
     }
-    store(pixel, receiver_0, blocked_0);
-    store(pixel + step, receiver_1, blocked_1);
-    store(pixel + 2u * step, receiver_2, blocked_2);
-    store(pixel + 3u * step, receiver_3, blocked_3);
+    store(task.x, pixel, receiver_0, blocked_0, in_parts);
+    store(task.x, pixel + step, receiver_1, blocked_1, in_parts);
+    store(task.x, pixel + 2u * step, receiver_2, blocked_2, in_parts);
+    store(task.x, pixel + 3u * step, receiver_3, blocked_3, in_parts);
 }

@@ -12,9 +12,8 @@
 #include "common/light.glsl"
 #include "common/materials.glsl"
 #include "shaft_masks/shaft.glsl"
+#include "shaft_masks/words.glsl"
 
-layout(constant_id = 1) const uint ROWS = 8u;
-layout(constant_id = 2) const uint COLUMNS = 8u;
 // 1 where triangles of the scene may have holes.
 layout(constant_id = 3) const uint MASKED = 0u;
 
@@ -119,12 +118,12 @@ Blocker fetch_blocker(uint triangle) {
 }
 
 // Takes out the samples that are seen through holes. ab, bc, ca: the lines of the triangle's edges.
-void cut_holes(Blocker blocker, vec3 ab, vec3 bc, vec3 ca, inout uint rows[ROWS]) {
+void cut_holes(Blocker blocker, vec3 ab, vec3 bc, vec3 ca, uint blocked[ROWS], inout uint rows[ROWS]) {
     uint material = material_number(blocker.plane.w);
     for (uint r = 0u; r < ROWS; ++r) {
         vec4 row = params.rows[r];
-        uint all = COLUMNS == 32u ? 0xffffffffu : (1u << COLUMNS) - 1u;
-        uint rest = rows[r] & all;
+        // What others block already needs no look.
+        uint rest = rows[r] & ALL_COLUMNS & ~blocked[r];
         while (rest != 0u) {
             uint column = uint(findLSB(rest));
             rest &= rest - 1u;
@@ -171,7 +170,7 @@ void add_blocker(MaskReceiver receiver, Blocker blocker, inout uint blocked[ROWS
             and_line(beyond, rows);
         }
         if (MASKED != 0u && material_is_masked(blocker.plane.w)) {
-            cut_holes(blocker, ab, bc, ca, rows);
+            cut_holes(blocker, ab, bc, ca, blocked, rows);
         }
         for (uint r = 0u; r < ROWS; ++r) {
             blocked[r] |= rows[r];
@@ -194,10 +193,9 @@ void start_mask(MaskReceiver receiver, vec3 normal, out uint blocked[ROWS]) {
 }
 
 float mask_visibility(uint blocked[ROWS]) {
-    uint all = COLUMNS == 32u ? 0xffffffffu : (1u << COLUMNS) - 1u;
     int seen = 0;
     for (uint r = 0u; r < ROWS; ++r) {
-        seen += bitCount(~blocked[r] & all);
+        seen += bitCount(~blocked[r] & ALL_COLUMNS);
     }
     return float(seen) / float(ROWS * COLUMNS);
 }

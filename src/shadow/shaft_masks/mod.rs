@@ -15,8 +15,10 @@
 //! | `start`, `tiles` | the picture's tiles that some of the light is above |
 //! | `shafts` | their shafts |
 //! | `lists` | lit and dark tiles settled; lists of the others |
-//! | `masks` | visibility of the others |
+//! | `masks` | visibility of the others, or what the beginnings of long lists hide |
+//! | `further`, `resolve` | the rest of long lists, and their tiles' visibility |
 
+mod masks;
 mod options;
 mod samples;
 
@@ -60,7 +62,11 @@ struct ShaftParams {
     rows: [[f32; 4]; MOST_ROWS],
 }
 
+/// Fewest tiles that lists have room for.
+const LEAST_TILES: u32 = 1024;
+
 /// Lists of triangles for the tiles that need masks.
+#[derive(Clone, Copy, Debug)]
 struct Lists {
     /// The tiles.
     tiles: TileList,
@@ -68,6 +74,45 @@ struct Lists {
     pool: ImageId,
     /// RGBA32_UINT: `TriangleList` of each tile.
     lists: ImageId,
+    /// Arguments of a dispatch over `tasks`.
+    further: BufferId,
+    /// RGBA32_UINT: parts of long lists.
+    tasks: ImageId,
+}
+
+/// Sizes of what the device fills.
+#[derive(Clone, Copy, Debug)]
+struct Sizes {
+    /// Rows of the image that holds the lists.
+    pool_rows: u32,
+    /// Chunks of a task: `TASK_CHUNKS` in `shaft_masks/lists.glsl`.
+    task_chunks: u32,
+}
+
+impl Sizes {
+    fn new(tiles: u32, options: &ShaftOptions, masked: bool) -> Self {
+        // A small picture's tiles are wide, and so are their shafts.
+        let rows = (tiles.max(LEAST_TILES) * options.room).div_ceil(POOL_WIDTH);
+        // A cut-out triangle costs a look for each sample, others a few operations a row.
+        let task_chunks = match (masked, options.side) {
+            (false, _) => 16,
+            (true, 8) => 4,
+            (true, _) => 1,
+        };
+        Self {
+            pool_rows: rows.min(MOST_POOL_ROWS),
+            task_chunks,
+        }
+    }
+
+    fn chunks(&self) -> u32 {
+        self.pool_rows * POOL_WIDTH / CHUNK_TEXELS
+    }
+}
+
+/// An image of so many texels in rows of [`POOL_WIDTH`].
+fn texels(format: vk::Format, count: u32) -> ImageDesc {
+    ImageDesc::new(format, POOL_WIDTH, count.div_ceil(POOL_WIDTH).max(1))
 }
 
 /// Declares the passes.
@@ -78,12 +123,10 @@ pub(super) fn add_passes<'f>(
 ) -> ShadowMask {
     let size = inputs.camera.size();
     let [across, down] = tile_counts(size);
-    let pool_rows = (across * down * options.room).div_ceil(POOL_WIDTH);
-    let pool_rows = pool_rows.min(MOST_POOL_ROWS);
-    let chunks = pool_rows * POOL_WIDTH / CHUNK_TEXELS;
+    let sizes = Sizes::new(across * down, &options, inputs.scene.has_masks());
     let nodes = inputs.scene.node_count() as u32;
     let mut params = ShaftParams {
-        counts: [size[0], size[1], nodes, chunks],
+        counts: [size[0], size[1], nodes, sizes.chunks()],
         rows: [[0.0; 4]; MOST_ROWS],
     };
     let rows = samples::rows(&inputs.light.shape, options.side);
@@ -93,9 +136,15 @@ pub(super) fn add_passes<'f>(
     let buffer = add_params(graph, inputs, params);
     let receivers = add_receivers(graph, inputs, NAME, reach(&inputs.light.shape));
     let shafts = add_shafts(graph, inputs, buffer, &receivers);
-    let pool = ImageDesc::new(vk::Format::R32_UINT, POOL_WIDTH, pool_rows.max(1));
-    let (lists, visibility) = add_lists(graph, inputs, buffer, &receivers, shafts, pool);
-    let visibility = add_masks(graph, inputs, options, buffer, shafts, &lists, visibility);
+    let (lists, visibility) = add_lists(graph, inputs, buffer, &receivers, shafts, sizes);
+    let masks = masks::Masks {
+        options,
+        task_chunks: sizes.task_chunks,
+        params: buffer,
+        shafts,
+        lists,
+    };
+    let visibility = masks.add(graph, inputs, visibility);
     ShadowMask::new(visibility)
 }
 
@@ -170,23 +219,31 @@ fn add_lists(
     params: BufferId,
     receivers: &Receivers,
     shafts: ImageId,
-    pool: ImageDesc,
+    sizes: Sizes,
 ) -> (Lists, ImageId) {
     let name = &inputs.light_name;
     let size = inputs.camera.size();
     let [across, down] = tile_counts(size);
     let mut penumbra = TileList::create(graph, &format!("{NAME}.penumbra {name}"), size);
-    let used = graph.create_buffer(format!("{NAME}.used {name}"), BufferDesc { size: 16 });
+    let sixteen = BufferDesc { size: 16 };
+    let used = graph.create_buffer(format!("{NAME}.used {name}"), sixteen);
+    let further = graph.create_buffer(format!("{NAME}.further {name}"), sixteen);
     let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
     penumbra.clear(&mut pass);
     let used = pass.overwrite(used, Access::Clear);
+    let further = pass.overwrite(further, Access::Clear);
     let cleared = penumbra;
     pass.record(move |ctx| {
         cleared.record_clear(ctx)?;
-        ctx.update_buffer(used, 0, &[0; 16])
+        ctx.update_buffer(used, 0, &[0; 16])?;
+        ctx.update_buffer(further, 0, bytemuck::cast_slice(&[0u32, 1, 1, 0]))
     });
 
+    let pool = texels(vk::Format::R32_UINT, sizes.pool_rows * POOL_WIDTH);
     let pool = graph.create_image(format!("{NAME}.pool {name}"), pool);
+    let tasks = sizes.chunks() / sizes.task_chunks;
+    let tasks = texels(vk::Format::R32G32B32A32_UINT, tasks);
+    let tasks = graph.create_image(format!("{NAME}.tasks {name}"), tasks);
     let desc = ImageDesc::new(vk::Format::R32G32B32A32_UINT, across, down);
     let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
     let (ids, view_depth, tile_bounds) =
@@ -210,7 +267,9 @@ fn add_lists(
     tiles.read(&mut pass);
     penumbra.fill(&mut pass);
     let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
+    let further = pass.write(further, Access::StorageReadWrite(Stage::Compute));
     let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
+    let tasks = pass.overwrite(tasks, Access::StorageWrite(Stage::Compute));
     let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
     let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
     pass.record(move |ctx| {
@@ -231,10 +290,12 @@ fn add_lists(
             Bind::storage_image(12, lists),
             Bind::storage_image(13, visibility),
             Bind::sampled(14, view_depth, nearest),
+            Bind::storage_buffer(15, further),
+            Bind::storage_image(16, tasks),
         ];
         let shader = &spirv::SHAFT_MASKS_LISTS_COMP;
         let pipeline = ComputePipelineDesc {
-            constants: vec![(0, shape)],
+            constants: vec![(0, shape), (4, sizes.task_chunks)],
             ..ComputePipelineDesc::new(shader)
         };
         ctx.bind_compute(&pipeline, &bindings, &[])?;
@@ -245,71 +306,8 @@ fn add_lists(
         tiles: penumbra,
         pool,
         lists,
+        further,
+        tasks,
     };
     (lists, visibility)
-}
-
-fn add_masks(
-    graph: &mut Graph<'_>,
-    inputs: &ShadowInputs<'_>,
-    options: ShaftOptions,
-    params: BufferId,
-    shafts: ImageId,
-    lists: &Lists,
-    visibility: ImageId,
-) -> ImageId {
-    let name = &inputs.light_name;
-    let (ids, gbuffer) = (inputs.ids, inputs.gbuffer);
-    let (view_params, part) = inputs.view_params;
-    let (tiles, pool, lists) = (lists.tiles, lists.pool, lists.lists);
-    let mut pass = graph.pass(format!("{NAME}.masks {name}"), PassKind::Compute);
-    pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
-    pass.read(params, Access::Uniform(Stage::Compute));
-    let images = [
-        gbuffer.view_depth,
-        gbuffer.ids,
-        ids.triangles,
-        ids.hierarchy,
-        shafts,
-        pool,
-        lists,
-    ];
-    for image in images.into_iter().chain(ids.mask_images()) {
-        pass.read(image, Access::Sampled(Stage::Compute));
-    }
-    tiles.read(&mut pass);
-    let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
-    let constants = vec![
-        (0, shape_number(&inputs.light.shape)),
-        (1, options.side),
-        (2, options.side),
-        (3, u32::from(inputs.scene.has_masks())),
-    ];
-    pass.record(move |ctx| {
-        let nearest = SamplerDesc::nearest();
-        let bindings = [
-            Bind::uniform(0, view_params).part(part),
-            Bind::uniform(1, params),
-            Bind::sampled(2, gbuffer.view_depth, nearest),
-            Bind::sampled(3, gbuffer.ids, nearest),
-            Bind::sampled(4, ids.triangles, nearest),
-            Bind::sampled(5, ids.hierarchy, nearest),
-            Bind::sampled(6, ids.materials, nearest),
-            Bind::sampled(7, ids.triangle_uvs, nearest),
-            Bind::sampled(8, ids.texels, nearest),
-            Bind::uniform(9, tiles.arguments),
-            Bind::sampled(10, tiles.tiles, nearest),
-            Bind::sampled(11, shafts, nearest),
-            Bind::sampled(12, pool, nearest),
-            Bind::sampled(13, lists, nearest),
-            Bind::storage_image(14, visibility),
-        ];
-        let pipeline = ComputePipelineDesc {
-            constants,
-            ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_MASKS_COMP)
-        };
-        ctx.bind_compute(&pipeline, &bindings, &[])?;
-        tiles.dispatch(ctx)
-    });
-    visibility
 }

@@ -15,7 +15,7 @@ pub struct ShaftOptions {
 impl ShaftOptions {
     /// What the technique does without options.
     pub const DEFAULT: Self = Self {
-        side: 8,
+        side: 16,
         room: 1024,
     };
 
@@ -23,7 +23,7 @@ impl ShaftOptions {
     pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
         TechniqueOption {
             name: "samples",
-            default: "64",
+            default: "256",
             values: "64, 256 or 1024",
             what: "samples of the light",
         },

@@ -6,6 +6,7 @@
 mod above;
 mod irradiance;
 mod overrides;
+mod profile;
 
 use std::f32::consts::PI;
 use std::fmt;
@@ -14,6 +15,7 @@ use std::str::FromStr;
 use glam::Vec3;
 
 pub use overrides::{LightOverrides, LightScale, LightSize, SunAngle};
+pub use profile::{LightProfile, MAX_PROFILE};
 
 /// Angular diameter of a sun for which the file states none, in radians (0.53 degrees).
 pub const DEFAULT_SUN_ANGLE: f32 = 0.009_250_245;
@@ -293,6 +295,9 @@ pub struct AreaLight {
     pub range: Option<f32>,
     /// The cone of a spot light.
     pub spot: Option<SpotCone>,
+    /// How brightness goes along a line; other shapes are even. Visibility counts each part of a line by
+    /// it.
+    pub profile: LightProfile,
 }
 
 impl AreaLight {
@@ -327,6 +332,7 @@ impl AreaLight {
             },
             range: None,
             spot: None,
+            profile: LightProfile::EVEN,
         }
     }
 
@@ -478,6 +484,21 @@ pub enum LightError {
     Cone {
         /// The value.
         text: String,
+    },
+    /// A profile that is none.
+    #[error(
+        "light profile `{text}` is none; give 2 to 8 numbers of 0 or more, not all 0, from the line's \
+         start (-x) to its end: `0.5,1`"
+    )]
+    Profile {
+        /// What was given.
+        text: String,
+    },
+    /// A profile for a light that is no line.
+    #[error("--light-profile needs a line, and this light is a {kind}")]
+    ProfileShape {
+        /// The light's shape.
+        kind: ShapeKind,
     },
     /// A frame that is not orthonormal or a centre that is not finite.
     #[error(

@@ -16,6 +16,7 @@ uvec4 gather_outreach(vec2 place, uint layer, bool backward);
 uint fetch_outreach(ivec2 texel, uint layer, bool backward);
 float fetch_map_depth(ivec2 texel, uint layer);
 uint fetch_map_id(ivec2 texel, uint layer);
+uint map_texels(); // across a map
 
 // 1: an edge is where its triangle ends in the receiver's plane through the light; 0: at the border
 // of a texel.
@@ -24,6 +25,11 @@ layout(constant_id = 2) const uint EXACT_EDGES = 1u;
 layout(constant_id = 4) const uint GAPS = 1u;
 // Steps along the hull from the edge of the surface that the map holds to that of the receiver.
 layout(constant_id = 3) const uint WALK = 2u;
+
+// 1: outreach maps hold two occluding edges a texel, of which none need be the right one.
+layout(constant_id = 5) const uint CANDIDATES = 0u;
+// 1: a receiver that an end's map does not show is in its penumbra all the same, as published.
+layout(constant_id = 6) const uint BY_PLACE = 0u;
 
 // A segment's end as a receiver sees it.
 struct End {
@@ -147,7 +153,17 @@ Edge edge_at(End end, Receiver receiver, Row row, int column, bool first, float 
             return Edge(clamp(exact.place, 0.0, 1.0), exact.kind);
         }
     }
-    float place = texel_place(end, row, column, first ? -0.5 : 0.5);
+    // Where a surface ends, it does so between its last texel and the next. Where it only bends away, the
+    // texel lies on it: there the shift falls as it does along the line to the receiver, by 1 / t.
+    float border = 0.5;
+    if (first) {
+        int next = clamp(column + (end.backward ? 1 : -1), 0, int(map_texels()) - 1);
+        float fall = end.texels * (fetch_map_depth(ivec2(column, row.index), end.layer)
+            - fetch_map_depth(ivec2(next, row.index), end.layer));
+        float t = texel_place(end, row, column, 0.0);
+        border = -0.5 * clamp(fall * t - 1.0, 0.0, 1.0);
+    }
+    float place = texel_place(end, row, column, border);
     return Edge(clamp(place, 0.0, 1.0), EDGE_TEXEL);
 }
 
@@ -243,6 +259,42 @@ float first_free(End end, Receiver receiver, vec2 size_texels, float texel_m) {
         : below.kind == EDGE_NONE ? above.place : joined(above, below, part.y, false);
 }
 
+// The nearest of a row's candidates; which: column of a map's edge, -1 for none.
+float candidate_place(End end, Row row, uvec2 texels, out int which) {
+    float best = 1.0e30;
+    which = -1;
+    for (uint i = 0u; i < 4u; ++i) {
+        uint both = (i & 1u) == 0u ? texels.x : texels.y;
+        int stored = int(i < 2u ? both & 0xffffu : both >> EDGE_BITS);
+        int column = end.backward ? stored - 1 : int(map_texels()) - stored;
+        float t = stored != 0 ? texel_place(end, row, column, 0.0) : 1.0e30;
+        which = t < best ? column : which;
+        best = min(best, t);
+    }
+    return best;
+}
+
+// Where the segment is hidden first, from candidates: 1 if there is none. Two rows' edges are as one
+// only where their depths agree, else one is of another object.
+float candidates_hidden(End end, vec2 size_texels) {
+    vec2 first = floor(end.place - 0.5);
+    uvec4 texels = gather_outreach((first + 1.0) / size_texels, end.outreach, end.backward);
+    Row upper = receiver_row(end, 0u);
+    Row lower = receiver_row(end, 1u);
+    int column_above;
+    int column_below;
+    float above = candidate_place(end, upper, texels.wz, column_above);
+    float below = candidate_place(end, lower, texels.xy, column_below);
+    if (column_above < 0 || column_below < 0) {
+        return clamp(min(above, below), 0.0, 1.0);
+    }
+    float depth_above = fetch_map_depth(ivec2(column_above, upper.index), end.layer);
+    float depth_below = fetch_map_depth(ivec2(column_below, lower.index), end.layer);
+    bool agree = abs(depth_above - depth_below) <= 0.05 * max(depth_above, depth_below);
+    float mixed = mix(above, below, end.place.y - 0.5 - first.y);
+    return clamp(agree ? mixed : min(above, below), 0.0, 1.0);
+}
+
 // Parts of a segment, places from its first end; empty ones end where they begin or before.
 struct Parts {
     vec2 first;
@@ -250,9 +302,32 @@ struct Parts {
     vec2 last;
 };
 
+// The visible parts by the published rules of merging (section 3.4): each penumbra is one part from an
+// end that is seen; a receiver in both that neither end sees has what they have in common.
+Parts merged_parts(End from, End to, vec2 size_texels) {
+    float reach_from = candidates_hidden(from, size_texels);
+    float reach_to = candidates_hidden(to, size_texels);
+    bool in_from = from.seen || (BY_PLACE != 0u && from.facing && reach_from < 1.0);
+    bool in_to = to.seen || (BY_PLACE != 0u && to.facing && reach_to < 1.0);
+    vec2 none = vec2(1.0);
+    vec2 first = vec2(0.0, reach_from);
+    vec2 last = vec2(1.0 - reach_to, 1.0);
+    bool overlap = first.y >= last.x;
+    if (from.seen && to.seen) {
+        return overlap ? Parts(vec2(0.0, 1.0), none, none) : Parts(first, none, last);
+    }
+    bool common_part = in_from == in_to && reach_from < 1.0 && reach_to < 1.0;
+    vec2 middle = common_part ? vec2(last.x, first.y) : none;
+    return in_from != in_to ? (in_from ? Parts(first, none, none) : Parts(none, none, last))
+        : Parts(none, middle, none);
+}
+
 // The visible parts of a segment. From an end that is seen, one part up to its first blocker, and
 // perhaps one between that blocker and the one nearest to the other end.
 Parts visible_parts(End from, End to, Receiver receiver, vec2 size_texels, float texel_m) {
+    if (CANDIDATES != 0u) {
+        return merged_parts(from, to, size_texels);
+    }
     vec2 hidden_from = from.seen ? first_hidden(from, receiver, size_texels, texel_m) : vec2(0.0);
     vec2 hidden_to = to.seen ? first_hidden(to, receiver, size_texels, texel_m) : vec2(0.0);
     // What is below the receiver's plane is left out by the caller.

@@ -6,13 +6,17 @@
 
 const uint MAX_SECTORS = 4u;
 const uint MAX_POINTS = 5u;
+const uint MAX_PROFILE = 8u;
 
 struct OessParams {
     vec4 start;   // xyz: the line's first point, scene space; w: length of a segment, metres
-    vec4 axis;    // xyz: unit vector along the line
+    vec4 axis;    // xyz: unit vector along the line; w: cells of its profile, 0 for an even light
     uvec4 counts; // sectors, points of the line, texels across and down a map
     vec4 shift[MAX_SECTORS]; // x: texels that a point moves from one end's map to the next's, for
                              // stored depth 1
+    vec4 profile[MAX_PROFILE]; // of each cell: brightness at its start and its rise over the cell, in
+                               // means of the line; then the integrals of brightness and of
+                               // brightness times place, 0 to 1, before it
     LightView views[MAX_SECTORS * MAX_POINTS]; // sector * points + point
 };
 

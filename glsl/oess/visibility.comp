@@ -59,6 +59,10 @@ uint fetch_map_id(ivec2 texel, uint layer) {
     return texelFetch(map_ids, ivec3(texel, int(layer)), 0).x;
 }
 
+uint map_texels() {
+    return params.counts.z;
+}
+
 vec4 fetch_triangle_texel(uint texel) {
     return texelFetch(triangles, triangle_texel_place(texel), 0);
 }
@@ -114,11 +118,25 @@ uint sector_of(vec3 p) {
     return sector;
 }
 
-// Adds the part of the line between two of its places, 0 to 1.
+// Light before a place of the line, 0 to 1, and the same light times its place.
+vec2 light_before(float place) {
+    float cells = params.axis.w;
+    if (cells == 0.0) {
+        return vec2(place, 0.5 * place * place);
+    }
+    float cell = clamp(floor(place * cells), 0.0, cells - 1.0);
+    float x = place * cells - cell;
+    vec4 at = params.profile[uint(cell)];
+    float part = x * (at.x + 0.5 * x * at.y);
+    float moment = cell * part + x * x * (0.5 * at.x + x * at.y / 3.0);
+    return at.zw + vec2(part, moment / cells) / cells;
+}
+
+// Adds the part of the line between two of its places, 0 to 1: its light, and what of that counts for the
+// first and the last end (section 3.4, figure 6).
 void add_part(inout vec3 sum, float from, float to) {
-    float part = max(to - from, 0.0);
-    float end = part * 0.5 * (to + from);
-    sum += vec3(part, part - end, end);
+    vec2 light = light_before(max(to, from)) - light_before(from);
+    sum += vec3(light.x, light.x - light.y, light.y);
 }
 
 void main() {
@@ -140,7 +158,8 @@ void main() {
     Receiver receiver = Receiver(p, n, vec3(0.0), false, id);
 
     // Visible part; what of it counts for the line's first end and for its last.
-    vec3 sum = vec3(1.0, 0.5, 0.5);
+    vec2 whole = light_before(1.0);
+    vec3 sum = vec3(1.0, 1.0 - whole.y, whole.y);
     uint sector = depth > 0.0 ? sector_of(p) : params.counts.x;
     if (depth > 0.0) {
         // The part of the line above the receiver's plane.

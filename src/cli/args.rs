@@ -9,7 +9,7 @@ use clap::Args;
 use super::error::CliError;
 use crate::batch::Sequence;
 use crate::capture::FrameRequest;
-use crate::light::{LightOverrides, LightScale, LightSize, ShapeKind, SunAngle};
+use crate::light::{LightOverrides, LightProfile, LightScale, LightSize, ShapeKind, SunAngle};
 use crate::scene::{LoadOptions, Scene, SceneCamera, SceneFile, SceneLight};
 use crate::shadow::Technique;
 
@@ -108,6 +108,11 @@ struct OverrideArgs {
     /// Angular diameter of suns in degrees
     #[arg(long, value_name = "DEG", allow_hyphen_values = true, help_heading = LIGHT_HEADING)]
     sun_angle: Option<SunAngle>,
+
+    /// Brightness along a line from its start (-x) to its end: 2 to 8 numbers at equal distances, straight
+    /// between, such as 0.2,1
+    #[arg(long, value_name = "A,B,..", allow_hyphen_values = true, help_heading = LIGHT_HEADING)]
+    light_profile: Option<LightProfile>,
 }
 
 /// A scene with the command line's changes, and the frame of it that was asked for.
@@ -196,6 +201,7 @@ impl ViewArgs {
             size: self.overrides.light_size,
             scale: self.overrides.light_scale,
             sun_angle: self.overrides.sun_angle,
+            profile: self.overrides.light_profile,
         };
         scene
             .override_lights(&overrides, selected)

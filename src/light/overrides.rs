@@ -3,7 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{AreaLight, IntensityUnit, LightError, LightShape, ShapeKind, check_length};
+use super::{
+    AreaLight, IntensityUnit, LightError, LightProfile, LightShape, ShapeKind, check_length,
+};
 
 /// `--light-size`: `R` for a disk's or sphere's radius, `L` for a line's length, `WxH` for a
 /// rectangle.
@@ -96,6 +98,8 @@ pub struct LightOverrides {
     pub scale: Option<LightScale>,
     /// Replaces the angle of suns.
     pub sun_angle: Option<SunAngle>,
+    /// Replaces the profile of lines.
+    pub profile: Option<LightProfile>,
 }
 
 impl LightOverrides {
@@ -111,6 +115,7 @@ impl LightOverrides {
             Self {
                 shape: None,
                 size: None,
+                profile: None,
                 ..*self
             }
         } else {
@@ -131,6 +136,12 @@ impl LightOverrides {
         let shape = self.apply_to_shape(&light.shape)?;
         shape.validate()?;
         let mut changed = AreaLight { shape, ..*light };
+        if let Some(profile) = self.profile {
+            if shape.kind() != ShapeKind::Line {
+                return Err(LightError::ProfileShape { kind: shape.kind() });
+            }
+            changed.profile = profile;
+        }
         if shape.kind() != light.shape.kind() && light.unit == IntensityUnit::Nits {
             changed.intensity = light.candela();
             changed.unit = IntensityUnit::Candela;

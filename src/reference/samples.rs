@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 use glam::{DVec2, DVec3};
 
 use super::triangles::End;
-use crate::light::{AreaLight, LightShape};
+use crate::light::{AreaLight, LightProfile, LightShape};
 
 /// A scrambled Sobol' sequence in two dimensions.
 ///
@@ -91,6 +91,8 @@ pub(super) struct LightFrom {
     half_y: DVec3,
     /// How exactly its points are known, metres.
     error: f64,
+    /// Of a line.
+    profile: LightProfile,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,6 +120,7 @@ impl LightFrom {
             half_x: x,
             half_y: y,
             error,
+            profile: light.profile,
         };
         match light.shape {
             LightShape::Point => planar(Kind::Point, DVec3::ZERO, DVec3::ZERO),
@@ -157,6 +160,7 @@ impl LightFrom {
                     half_x: x,
                     half_y: y,
                     error: 0.0,
+                    profile: light.profile,
                 }
             }
         }
@@ -194,11 +198,16 @@ impl LightFrom {
         ])
     }
 
-    /// The point of the light for a point of the unit square, equal areas to equal areas.
+    /// The point of the light for a point of the unit square, equal areas to equal areas; on a line to
+    /// equal parts of its light.
     pub(super) fn spread(&self, p: DVec2) -> End {
         let p = 2.0 * p - 1.0;
         match self.kind {
             Kind::Disk | Kind::Sun(_) => self.at(disk_from_square(p)),
+            Kind::Line => {
+                let place = self.profile.place_of(0.5 * (p.x + 1.0));
+                self.at(DVec2::new(2.0 * place - 1.0, 0.0))
+            }
             _ => self.at(p),
         }
     }

@@ -113,6 +113,8 @@ impl Scene {
             "--light-shape"
         } else if overrides.size.is_some() && !any_other {
             "--light-size"
+        } else if overrides.profile.is_some() && !any_other {
+            "--light-profile"
         } else {
             return Ok(());
         };

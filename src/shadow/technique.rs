@@ -78,6 +78,14 @@ pub enum TechniqueError {
         /// Values it takes.
         values: &'static str,
     },
+    /// The technique takes all parts of a line for equally bright.
+    #[error(
+        "technique `{technique}` cannot do a light profile; `oess` does, and `hard` needs none"
+    )]
+    Profile {
+        /// The technique.
+        technique: &'static str,
+    },
     /// The technique cannot do this light.
     #[error("technique `{technique}` cannot do a {shape} light; it does {known}")]
     Shape {
@@ -257,9 +265,15 @@ impl Technique {
     /// Refuses a light that the technique cannot do.
     ///
     /// # Errors
-    /// [`TechniqueError::Shape`], which names the shapes that it can do.
+    /// [`TechniqueError::Shape`], which names the shapes that it can do, or
+    /// [`TechniqueError::Profile`].
     pub fn check(self, light: &AreaLight) -> Result<(), TechniqueError> {
         let shape = light.shape.kind();
+        let uneven = shape == ShapeKind::Line && !light.profile.is_even();
+        if uneven && !matches!(self, Self::Hard | Self::Oess(_)) {
+            let technique = self.name();
+            return Err(TechniqueError::Profile { technique });
+        }
         if self.shapes().contains(&shape) {
             return Ok(());
         }

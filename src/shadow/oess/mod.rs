@@ -22,7 +22,7 @@ mod options;
 mod outreach;
 mod views;
 
-pub use options::OessOptions;
+pub use options::{Find, OessOptions, Outreach};
 
 use super::light_view::LightView;
 use super::map::{ShadowMap, add_maps_of_size};
@@ -31,7 +31,7 @@ use super::{ShadowInputs, ShadowMask, hard};
 use crate::geometry::DrawTarget;
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, PassKind, Stage};
-use crate::light::{AreaLight, LightShape, ShapeKind};
+use crate::light::{AreaLight, LightProfile, LightShape, MAX_PROFILE, ShapeKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use views::{LineViews, MOST_SECTORS, line_views};
@@ -53,6 +53,7 @@ struct OessParams {
     axis: [f32; 4],
     counts: [u32; 4],
     shift: [[f32; 4]; MOST_SECTORS],
+    profile: [[f32; 4]; MAX_PROFILE],
     views: [LightView; MOST_SECTORS * MOST_POINTS],
 }
 
@@ -87,7 +88,7 @@ pub(super) fn add_passes<'f>(
         DrawTarget::Ids,
         options.resolution,
     );
-    let outreach = outreach::add_outreach(graph, inputs, &maps, &params);
+    let outreach = outreach::add_outreach(graph, inputs, &options, &maps, &params);
     add_visibility(graph, inputs, &options, buffer, &maps, outreach)
 }
 
@@ -107,9 +108,10 @@ fn params_of(
     let points = segments as usize + 1;
     let segment = length / segments as f32;
     let start = light.center - light.axis_x * (0.5 * length);
+    let (cells, profile) = profile_of(&light.profile);
     let mut params = OessParams {
         start: start.extend(segment).to_array(),
-        axis: light.axis_x.extend(0.0).to_array(),
+        axis: light.axis_x.extend(cells as f32).to_array(),
         counts: [
             views.sectors as u32,
             points as u32,
@@ -117,6 +119,7 @@ fn params_of(
             options.resolution,
         ],
         shift: [[0.0; 4]; MOST_SECTORS],
+        profile,
         views: [LightView::default(); MOST_SECTORS * MOST_POINTS],
     };
     for (layer, view) in views.views.views.iter().enumerate() {
@@ -126,6 +129,27 @@ fn params_of(
         params.shift[layer / points] = [texels / view.scale[2], 0.0, 0.0, 0.0];
     }
     params
+}
+
+/// `profile` in `oess/params.glsl`, and the number of its cells: 0 for an even light.
+fn profile_of(profile: &LightProfile) -> (usize, [[f32; 4]; MAX_PROFILE]) {
+    let mut cells = [[0.0; 4]; MAX_PROFILE];
+    if profile.is_even() {
+        return (0, cells);
+    }
+    let values: Vec<f64> = profile.values().iter().map(|v| f64::from(*v)).collect();
+    let count = values.len() - 1;
+    let width = 1.0 / count as f64;
+    let whole: f64 = values.windows(2).map(|v| 0.5 * width * (v[0] + v[1])).sum();
+    let (mut before, mut moment) = (0.0, 0.0);
+    for (i, pair) in values.windows(2).enumerate() {
+        let (a, rise) = (pair[0] / whole, (pair[1] - pair[0]) / whole);
+        cells[i] = [a, rise, before, moment].map(|v| v as f32);
+        before += width * (a + 0.5 * rise);
+        let inner = 0.5 * a + rise / 3.0;
+        moment += width * width * (i as f64 * (a + 0.5 * rise) + inner);
+    }
+    (count, cells)
 }
 
 fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: OessParams) -> BufferId {
@@ -144,7 +168,7 @@ fn add_visibility<'f>(
     options: &OessOptions,
     params: BufferId,
     maps: &ShadowMap,
-    outreach: outreach::Outreach,
+    outreach: outreach::OutreachMaps,
 ) -> ShadowMask {
     let name = &inputs.light_name;
     let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.bounding_radius());
@@ -214,6 +238,8 @@ fn add_visibility<'f>(
                 (2, u32::from(options.exact)),
                 (3, options.walk),
                 (4, u32::from(options.gaps)),
+                (5, u32::from(options.outreach != Outreach::Hull)),
+                (6, u32::from(options.by_place)),
             ],
             ..ComputePipelineDesc::new(&spirv::OESS_VISIBILITY_COMP)
         };

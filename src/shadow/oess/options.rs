@@ -2,6 +2,56 @@
 
 use crate::shadow::TechniqueOption;
 
+/// How the occluding edges that hide light from a texel are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outreach {
+    /// By tangents to the hull of the texel's row: the edge itself, whatever its place.
+    Hull,
+    /// By a scan for two candidates among the edges that [`Find`] finds.
+    Scan,
+    /// As `Scan`, but by looking at all of the row from each texel: to check the scan by.
+    Search,
+    /// As published: each edge is written to all texels of its penumbra.
+    Scatter,
+}
+
+/// Which texels are occluding edges; not used by [`Outreach::Hull`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Find {
+    /// Those whose corresponding pixel lies before that of the texel before.
+    Fold,
+    /// Strategy 2 of the paper: the least corresponding pixel of three.
+    Location,
+    /// Strategy 1 of the paper: facing the other end, after one that does not.
+    Tilt,
+    /// Both strategies.
+    Both,
+}
+
+const OUTREACHES: [(&str, Outreach); 4] = [
+    ("hull", Outreach::Hull),
+    ("scan", Outreach::Scan),
+    ("search", Outreach::Search),
+    ("scatter", Outreach::Scatter),
+];
+
+const FINDS: [(&str, Find); 4] = [
+    ("fold", Find::Fold),
+    ("location", Find::Location),
+    ("tilt", Find::Tilt),
+    ("both", Find::Both),
+];
+
+fn named<T: Copy>(list: &[(&str, T)], name: &str) -> Option<T> {
+    list.iter().find(|(n, _)| *n == name).map(|(_, v)| *v)
+}
+
+fn name_of<T: Copy + PartialEq>(list: &[(&'static str, T)], value: T) -> &'static str {
+    list.iter()
+        .find(|(_, v)| *v == value)
+        .map_or("", |(n, _)| n)
+}
+
 /// Options of `oess`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OessOptions {
@@ -15,6 +65,13 @@ pub struct OessOptions {
     pub gaps: bool,
     /// Steps from the stored surface's edge towards the receiver's own, 0 to 16.
     pub walk: u32,
+    /// How occluding edges reach the texels of their penumbrae.
+    pub outreach: Outreach,
+    /// Which texels are occluding edges.
+    pub find: Find,
+    /// With candidates: a receiver that a map does not show is in its penumbra by its place alone,
+    /// as published.
+    pub by_place: bool,
 }
 
 impl OessOptions {
@@ -25,6 +82,9 @@ impl OessOptions {
         exact: true,
         gaps: true,
         walk: 2,
+        outreach: Outreach::Hull,
+        find: Find::Both,
+        by_place: false,
     };
 
     /// What can be set.
@@ -59,6 +119,24 @@ impl OessOptions {
             "0 to 16",
             "steps from the stored surface's occluding edge to the receiver's",
         ),
+        option(
+            "outreach",
+            "hull",
+            "hull, scan (two of the edges found), search (slow check of scan) or scatter (published)",
+            "how occluding edges reach the texels of their penumbrae",
+        ),
+        option(
+            "find",
+            "both",
+            "fold, location (strategy 2), tilt (strategy 1) or both (strategies)",
+            "which texels are occluding edges, for outreach=scan, search and scatter",
+        ),
+        option(
+            "penumbra",
+            "depth",
+            "depth or place (published: also receivers behind what the map shows)",
+            "which receivers an end's penumbra holds, for outreach=scan, search and scatter",
+        ),
     ];
 
     /// The values, in the order of [`ALL`](Self::ALL).
@@ -69,6 +147,9 @@ impl OessOptions {
             if self.exact { "exact" } else { "texels" }.to_string(),
             u32::from(self.gaps).to_string(),
             self.walk.to_string(),
+            name_of(&OUTREACHES, self.outreach).to_string(),
+            name_of(&FINDS, self.find).to_string(),
+            if self.by_place { "place" } else { "depth" }.to_string(),
         ]
     }
 
@@ -89,6 +170,15 @@ impl OessOptions {
             }
             "gaps" => self.gaps = number(0..=1)? == 1,
             "walk" => self.walk = number(0..=16)?,
+            "outreach" => self.outreach = named(&OUTREACHES, value)?,
+            "find" => self.find = named(&FINDS, value)?,
+            "penumbra" => {
+                self.by_place = match value {
+                    "depth" => false,
+                    "place" => true,
+                    _ => return None,
+                }
+            }
             _ => return None,
         }
         Some(())

@@ -153,17 +153,21 @@ Edge edge_at(End end, Receiver receiver, Row row, int column, bool first, float 
             return Edge(clamp(exact.place, 0.0, 1.0), exact.kind);
         }
     }
-    // Where a surface ends, it does so between its last texel and the next. Where it only bends away, the
-    // texel lies on it: there the shift falls as it does along the line to the receiver, by 1 / t.
-    float border = 0.5;
-    if (first) {
-        int next = clamp(column + (end.backward ? 1 : -1), 0, int(map_texels()) - 1);
-        float fall = end.texels * (fetch_map_depth(ivec2(column, row.index), end.layer)
-            - fetch_map_depth(ivec2(next, row.index), end.layer));
-        float t = texel_place(end, row, column, 0.0);
-        border = -0.5 * clamp(fall * t - 1.0, 0.0, 1.0);
-    }
+    // A surface ends between its last texel and the next. A flat one goes on to there as it is. A round
+    // one bends away, along the line to the receiver at most: there the shift falls by 1 / t a texel.
+    float border = first ? -0.5 : 0.5;
     float place = texel_place(end, row, column, border);
+    float t = texel_place(end, row, column, 0.0);
+    if (first && t > 0.0 && t < 1.0e30) {
+        int inner = clamp(column + (end.backward ? -1 : 1), 0, int(map_texels()) - 1);
+        float s = end.texels * fetch_map_depth(ivec2(column, row.index), end.layer);
+        float s_inner = end.texels * fetch_map_depth(ivec2(inner, row.index), end.layer);
+        float bend = clamp((s_inner - s) * t, 0.0, 1.0);
+        // (x - 1/2) / (rise - bend / 2t), where x = t rise.
+        float rise = s - row.s;
+        place = (t * rise - 0.5) / max(rise - 0.5 * bend / t, 1.0e-30);
+        place = min(place, t);
+    }
     return Edge(clamp(place, 0.0, 1.0), EDGE_TEXEL);
 }
 

@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, de};
 
-use crate::light::{LightOverrides, LightScale, LightSize, ShapeKind, SunAngle};
+use crate::light::{LightOverrides, LightProfile, LightScale, LightSize, ShapeKind, SunAngle};
 use crate::scene::SceneError;
 use crate::shadow::Technique;
 
@@ -101,7 +101,7 @@ pub enum Cameras {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(
     untagged,
-    expecting = "give \"each\", or a list of lights, each by name, index or as { name, shape, size, scale, sun-angle }"
+    expecting = "give \"each\", or a list of lights, each by name, index or as { name, shape, size, scale, sun-angle, profile }"
 )]
 #[allow(missing_docs)]
 pub enum Lights {
@@ -155,6 +155,7 @@ pub struct LightTable {
     pub size: Option<Text<LightSize>>,
     pub scale: Option<f32>,
     pub sun_angle: Option<f32>,
+    pub profile: Option<Text<LightProfile>>,
 }
 
 impl LightTable {
@@ -165,6 +166,7 @@ impl LightTable {
             size: self.size.as_ref().map(|size| size.value),
             scale: self.scale.map(LightScale),
             sun_angle: self.sun_angle.map(SunAngle),
+            profile: self.profile.as_ref().map(|profile| profile.value),
         }
     }
 
@@ -176,6 +178,7 @@ impl LightTable {
             ("size", self.size.as_ref().map(|size| size.text.clone())),
             ("scale", self.scale.map(|scale| scale.to_string())),
             ("sun", self.sun_angle.map(|angle| angle.to_string())),
+            ("profile", self.profile.as_ref().map(|p| p.text.clone())),
         ];
         for (name, part) in parts {
             if let Some(part) = part {

@@ -153,6 +153,7 @@ impl ViewArgs {
                 light_size: overrides.size,
                 light_scale: overrides.scale,
                 sun_angle: overrides.sun_angle,
+                light_profile: overrides.profile,
             },
         }
     }

@@ -82,12 +82,10 @@ Kernel kernel_at(Receiver at, float plane, float inverse) {
     return Kernel(middle, halves, middle - box, middle + box);
 }
 
-// Fine slices with anything in the texels that kernels from one plane to the receiver can touch.
-uvec4 slices_within(Receiver at, vec4 first_plane) {
-    Kernel a = kernel_at(at, first_plane.x, first_plane.w);
-    Kernel b = kernel_at(at, at.v.z, occlusion_inverse(slice_view, at.v.z));
-    vec2 low = (min(a.low, b.low) * DETAIL - 1.0) * 0.25;
-    vec2 high = (max(a.high, b.high) * DETAIL + 1.0) * 0.25;
+// Fine slices with anything in a box of texels, and in those beside it.
+uvec4 slices_in_box(vec2 low, vec2 high) {
+    low = (low * DETAIL - 1.0) * 0.25;
+    high = (high * DETAIL + 1.0) * 0.25;
     ivec2 size = textureSize(any_slices, 0);
     low = clamp(low, vec2(0.0), vec2(size) - 1.0);
     high = clamp(high, vec2(0.0), vec2(size) - 1.0);
@@ -98,6 +96,13 @@ uvec4 slices_within(Receiver at, vec4 first_plane) {
     return texelFetch(any_slices, from, level) | texelFetch(any_slices, to, level)
         | texelFetch(any_slices, ivec2(from.x, to.y), level)
         | texelFetch(any_slices, ivec2(to.x, from.y), level);
+}
+
+// Those that kernels from one plane to the receiver can touch.
+uvec4 slices_within(Receiver at, vec4 first_plane) {
+    Kernel a = kernel_at(at, first_plane.x, first_plane.w);
+    Kernel b = kernel_at(at, at.v.z, occlusion_inverse(slice_view, at.v.z));
+    return slices_in_box(min(a.low, b.low), max(a.high, b.high));
 }
 
 float fetched = 0.0; // texture accesses of filters
@@ -218,6 +223,11 @@ float through_slices(Receiver at) {
             }
         }
         if (fade == 0.0) {
+            continue;
+        }
+        // All between the light and the receiver is a long strip where the light shines in flat: most
+        // groups hold something there and nothing in their own kernel.
+        if ((slices_in_box(kernel.low, kernel.high) & groups.masks[group]) == uvec4(0u)) {
             continue;
         }
         vec2 mean = blocked(group, kernel);

@@ -86,8 +86,8 @@ pub struct OcclusionOptions {
     pub fit: Fit,
     /// Texels across the slices' image, 64 to 4096, a power of two.
     pub resolution: u32,
-    /// Texels of it across one of the filtered textures, 1, 2 or 4.
-    pub detail: u32,
+    /// Texels of it across one of the filtered textures, 1, 2 or 4; `None`: by the size of kernels.
+    pub detail: Option<u32>,
     /// A texture lies in the middle of its slices, not in their lowest plane.
     pub middle: bool,
     /// Rays of the test for blockers near the receiver, 0 to 64; it needs [`Fit::Occupied`].
@@ -99,22 +99,22 @@ pub struct OcclusionOptions {
 impl OcclusionOptions {
     /// What the technique does without options.
     pub const DEFAULT: Self = Self {
-        slices: 16,
+        slices: 32,
         filter: Filter::SummedAreas,
         combine: Combine::Cumulative,
         planes: Planes::Blend,
         projection: Projection::Centered,
         fit: Fit::Occupied,
-        resolution: 512,
-        detail: 2,
+        resolution: 2048,
+        detail: None,
         middle: true,
-        contact: 4,
+        contact: 8,
         count_fetches: false,
     };
 
     /// What can be set.
     pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
-        option("slices", "16", "4 to 128", "occlusion textures"),
+        option("slices", "32", "4 to 128", "occlusion textures"),
         option(
             "filter",
             "sat",
@@ -148,14 +148,14 @@ impl OcclusionOptions {
         ),
         option(
             "resolution",
-            "512",
+            "2048",
             "64 to 4096, a power of two",
             "texels across the slices",
         ),
         option(
             "detail",
-            "2",
-            "1, 2 or 4",
+            "auto",
+            "1, 2, 4 or auto (4, but 2 under kernels below an eighth of the view)",
             "texels of the slices across one of the filtered textures",
         ),
         option(
@@ -166,7 +166,7 @@ impl OcclusionOptions {
         ),
         option(
             "contact",
-            "4",
+            "8",
             "0 to 64",
             "rays of the test for blockers near the receiver",
         ),
@@ -216,7 +216,8 @@ impl OcclusionOptions {
             projection.to_string(),
             fit.to_string(),
             self.resolution.to_string(),
-            self.detail.to_string(),
+            self.detail
+                .map_or("auto".to_string(), |texels| texels.to_string()),
             if self.middle { "middle" } else { "lower" }.to_string(),
             self.contact.to_string(),
             if self.count_fetches {
@@ -279,7 +280,8 @@ impl OcclusionOptions {
                 }
             }
             "resolution" => self.resolution = number(64..=4096).filter(|n| n.is_power_of_two())?,
-            "detail" => self.detail = number(1..=4).filter(|n| n.is_power_of_two())?,
+            "detail" if value == "auto" => self.detail = None,
+            "detail" => self.detail = Some(number(1..=4).filter(|n| n.is_power_of_two())?),
             "depth" => {
                 self.middle = match value {
                     "middle" => true,
@@ -306,6 +308,13 @@ impl OcclusionOptions {
             Fit::Range => self.slices,
             Fit::Occupied => (4 * self.slices).next_multiple_of(32).min(128),
         }
+    }
+
+    /// Texels of the bits across one of the filtered textures, for a view whose largest kernel covers
+    /// this part of the image. Small kernels span few texels, whose borders then count.
+    pub(super) fn texels_filtered(&self, most_kernel: f64) -> u32 {
+        let small = most_kernel.sqrt() < 0.125;
+        self.detail.unwrap_or(if small { 2 } else { 4 })
     }
 
     /// 32-bit words that hold a bit for each fine slice.

@@ -39,17 +39,18 @@ fn add_tables(
     options: &OcclusionOptions,
     slices: &Slices,
 ) -> Filtered {
-    let side = options.resolution / options.detail;
+    let detail = options.texels_filtered(slices.most_kernel);
+    let side = options.resolution / detail;
     // Boxes count texels of the bits; half a texel more on each side is for their borders.
     let bits = f64::from(options.resolution);
-    let most = (slices.most_kernel.sqrt() * bits + 4.0 * f64::from(options.detail)).powi(2);
+    let most = (slices.most_kernel.sqrt() * bits + 4.0 * f64::from(detail)).powi(2);
     let packed = most < 65_536.0;
     let layers = options.slices * if packed { 1 } else { 2 };
     let desc = ImageDesc::new(vk::Format::R32_UINT, side + 1, side + 1).layers(layers);
     let tables = graph.create_image(format!("{NAME}.tables {name}"), desc);
     let constants = vec![
         (0, options.words()),
-        (1, options.detail),
+        (1, detail),
         (2, u32::from(packed)),
         (3, u32::from(options.combine == Combine::Cumulative)),
     ];
@@ -113,7 +114,8 @@ fn add_averages(
     options: &OcclusionOptions,
     slices: &Slices,
 ) -> Filtered {
-    let side = options.resolution / options.detail;
+    let detail = options.texels_filtered(slices.most_kernel);
+    let side = options.resolution / detail;
     let mipmaps = options.filter == Filter::Mipmaps;
     let layers = options.slices;
     let desc = ImageDesc::new(vk::Format::R16G16B16A16_SFLOAT, side, side);
@@ -132,7 +134,7 @@ fn add_averages(
     let averages = graph.create_image(format!("{NAME}.averages {name}"), desc);
     let (bits, groups) = (slices.bits, slices.groups);
     let constants = vec![
-        (1, options.detail),
+        (1, detail),
         (3, u32::from(options.combine == Combine::Cumulative)),
     ];
     let mut pass = graph.pass(format!("{NAME}.averages {name}.0"), PassKind::Compute);

@@ -51,11 +51,12 @@ pub(super) fn add_visibility<'f>(
         Combine::Cumulative => 4,
         Combine::Bounded => 5,
     };
+    let detail = options.texels_filtered(slices.most_kernel);
     let mut constants = vec![
         (0, shape_number(&light.shape)),
         (1, combine),
         (4, u32::from(index == 0)),
-        (5, (options.detail as f32).to_bits()),
+        (5, (detail as f32).to_bits()),
         (7, options.contact),
         (8, options.fine_slices()),
         (12, u32::from(options.count_fetches)),

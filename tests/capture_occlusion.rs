@@ -21,7 +21,10 @@ fn request(camera: &SceneCamera, size: [u32; 2], options: &str) -> FrameRequest 
         camera: camera.clone(),
         size,
         lights: vec![0],
-        technique: format!("occlusion-textures:{options}").parse().unwrap(),
+        // Coarser than the default, which takes SwiftShader seconds; a later option wins.
+        technique: format!("occlusion-textures:resolution=512,detail=2,slices=16,{options}")
+            .parse()
+            .unwrap(),
     }
 }
 

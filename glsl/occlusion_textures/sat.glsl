@@ -38,7 +38,10 @@ vec2 box_sums(uint layer, vec2 low, vec2 high, float side, bool packed_sums) {
         return vec2(dot(low_sums, columns), dot(high_sums, columns));
     }
     vec3 sums = vec3(dot(vec3(whole_box), rows), dot(vec3(more_box), rows), dot(vec3(less_box), rows));
-    return vec2(dot(sums, vec3(1.0, beyond.x, -before.x)), 0.0);
+    // Fractions that cancel leave rounding behind, which must not darken what nothing blocks.
+    float sum = dot(sums, vec3(1.0, beyond.x, -before.x));
+    float most = float(whole_box.x) + float(more_box.x) + float(less_box.x);
+    return vec2(sum > 2.0e-6 * most ? sum : 0.0, 0.0);
 }
 
 #endif

@@ -1,4 +1,4 @@
-.PHONY: help demo test bench bench-check bench-plan clean-deps
+.PHONY: help demo test bench bench-check bench-plan slurm-test cluster-check clean-deps
 
 # For make bench: scenes, what is held against each other, picture size, and where it goes.
 SCENES ?= assets
@@ -18,6 +18,8 @@ help:
 	@echo "make bench       run time against error of all techniques over all scenes, to out/bench/"
 	@echo "make bench-check look at out/bench/report.html in headless Chromium"
 	@echo "make bench-plan  criterion benchmarks of the render graph"
+	@echo "make slurm-test  32 tasks of a real Slurm on this machine against one process; needs root"
+	@echo "make cluster-check  the Kubernetes manifest against its schema"
 	@echo "make clean-deps  remove what set-up unpacked into .deps/"
 
 demo:
@@ -43,6 +45,13 @@ bench-check:
 bench-plan:
 	scripts/setup.sh demo
 	cargo bench
+
+slurm-test:
+	cargo build --release
+	BIN=$(BIN) scripts/slurm_test.sh out/slurm
+
+cluster-check:
+	scripts/cluster_check.sh
 
 clean-deps:
 	rm -rf .deps

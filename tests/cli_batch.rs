@@ -124,6 +124,141 @@ fn shards_together_are_the_whole_and_what_is_finished_stays() -> Result {
     Ok(())
 }
 
+fn json(path: &Path) -> Result<serde_json::Value> {
+    Ok(serde_json::from_slice(&fs::read(path)?)?)
+}
+
+#[test]
+fn merged_shards_are_what_one_process_makes() -> Result {
+    let folder = folder(JOBS)?;
+    let folder = folder.path();
+    let merge = |args: &[&str]| -> Result<Output> {
+        Ok(program(folder, &[&["merge"], args].concat()).output()?)
+    };
+    text(&batch(folder, &["--out", "whole"])?, 0);
+    // On two nodes that share no folder.
+    text(&batch(folder, &["--out", "a", "--shard", "1/3"])?, 0);
+    text(&batch(folder, &["--out", "b", "--shard", "2/3"])?, 0);
+    let output = merge(&["a", "b", "--out", "all"])?;
+    let missing = text(&batch(folder, &["--list", "--shard", "3/3"])?, 0);
+    let missing = missing
+        .lines()
+        .filter_map(|line| Some(format!("{}: missing", line.rsplit('\t').next()?)));
+    let missing: Vec<String> = missing.collect();
+    assert!(text(&output, 1).contains(&format!(
+        "{} of {ITEMS} are missing or failed",
+        missing.len()
+    )));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(said.lines().collect::<Vec<_>>(), missing);
+    assert!(!folder.join("all").exists());
+
+    text(&batch(folder, &["--out", "b", "--shard", "3/3"])?, 0);
+    text(&merge(&["a", "b", "--out", "all", "--no-timings"])?, 0);
+    text(&merge(&["whole", "--out", "one", "--no-timings"])?, 0);
+    assert_eq!(
+        fs::read(folder.join("all/results.json"))?,
+        fs::read(folder.join("one/results.json"))?
+    );
+    text(&merge(&["whole"])?, 0);
+    let whole = json(&folder.join("whole/results.json"))?;
+    assert_eq!(
+        (&whole["items"], &whole["failures"][0]["kind"]),
+        (&ITEMS.into(), &"unsupported".into())
+    );
+    let images = whole["images"].as_array().ok_or("no images")?;
+    assert_eq!(images.len(), ITEMS - 1);
+    assert!(
+        images
+            .iter()
+            .all(|entry| entry["frame_ms"]["median"].as_f64() > Some(0.0))
+    );
+    assert_eq!(images[3]["item"], "walk/figure.hard/0003");
+    assert_eq!(images[3]["files"][0]["path"], "walk/figure.hard/0003.png");
+    let page = fs::read_to_string(folder.join("all/report.html"))?;
+    let sources = page
+        .split("src=\"")
+        .skip(1)
+        .filter_map(|rest| rest.split('"').next());
+    let sources: Vec<&str> = sources.collect();
+    assert!(
+        sources.len() > 8 && sources.iter().any(|src| src.starts_with("../b/")),
+        "{sources:?}"
+    );
+    assert!(
+        sources
+            .iter()
+            .all(|src| folder.join("all").join(src.replace("%3D", "=")).exists())
+    );
+
+    // A file that is broken, and jobs that are others.
+    fs::write(
+        folder.join("whole/walk/figure.hard/0005.png"),
+        b"no picture",
+    )?;
+    let error = text(&merge(&["whole"])?, 1);
+    assert!(
+        error.contains("1 of 18") && error.contains("0005.png is missing or broken"),
+        "{error}"
+    );
+    let others = JOBS.replace("0..12", "0..1");
+    fs::write(folder.join("jobs.toml"), others)?;
+    text(&batch(folder, &["--out", "others", "--shard", "1/9"])?, 0);
+    assert!(text(&merge(&["a", "others"])?, 1).contains("different jobs"));
+    assert!(text(&merge(&["cache"])?, 1).contains("no list of items there"));
+    Ok(())
+}
+
+#[test]
+fn shards_of_a_benchmark_merge_into_one() -> Result {
+    let folder = folder(JOBS)?;
+    let folder = folder.path();
+    let bench = |out: &str, shard: &str| -> Result<Output> {
+        let fixed = [
+            "bench",
+            "sphere_over_plane.gltf",
+            "tube.gltf",
+            "--techniques",
+            "hard,rays:2",
+        ];
+        let more = [
+            "--size",
+            "32x32",
+            "--samples",
+            "16",
+            "--repeat",
+            "1",
+            "--out",
+            out,
+            "--shard",
+            shard,
+        ];
+        Ok(program(folder, &[&fixed[..], &more].concat()).output()?)
+    };
+    let merge = |args: &[&str]| -> Result<Output> {
+        Ok(program(folder, &[&["merge"], args].concat()).output()?)
+    };
+    text(&bench("whole", "1/1")?, 0);
+    text(&bench("parts", "1/2")?, 0);
+    let output = merge(&["parts"])?;
+    assert!(text(&output, 1).contains("tube.gltf, light 0: missing"));
+    text(&bench("parts", "2/2")?, 0);
+    text(&merge(&["parts", "--no-timings"])?, 0);
+    text(&merge(&["whole", "--out", "one", "--no-timings"])?, 0);
+    assert_eq!(
+        fs::read(folder.join("parts/results.json"))?,
+        fs::read(folder.join("one/results.json"))?
+    );
+    assert_eq!(
+        images(&folder.join("parts"))?,
+        images(&folder.join("whole"))?
+    );
+    let results = json(&folder.join("parts/results.json"))?;
+    assert_eq!(results["images"].as_array().map(Vec::len), Some(4));
+    assert!(fs::read_to_string(folder.join("parts/report.html"))?.contains("data:image/png"));
+    Ok(())
+}
+
 #[test]
 fn schedulers_say_which_shard() -> Result {
     let folder = folder(JOBS)?;
@@ -141,6 +276,12 @@ fn schedulers_say_which_shard() -> Result {
     let second = text(&batch(folder.path(), &["--list", "--shard", "2/3"])?, 0);
     assert!(!second.is_empty());
     assert_eq!(text(&told(&slurm, &[])?, 0), second);
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/cluster/jobs.toml");
+    let listed = text(
+        &program(folder.path(), &["batch", example, "--list"]).output()?,
+        0,
+    );
+    assert!(listed.contains("walk/figure.pcss_taps=64/0047"), "{listed}");
     assert_eq!(
         text(
             &told(&[("JOB_COMPLETION_INDEX", "1")], &["--shards", "3"])?,

@@ -3,11 +3,13 @@
 //!
 //! A [`JobFile`] describes jobs, a [`List`] has their items in an order that depends on nothing
 //! else. [`run_of`] cuts the list for shards; a [`Record`] beside an item's files says what they
-//! are and what they were made from.
+//! are and what they were made from, and [`gather`] checks and collects the records.
 
 pub mod balance;
+pub mod gather;
 pub mod jobs;
 pub mod list;
+pub mod page;
 pub mod record;
 pub mod scene_file;
 pub mod shard;

@@ -25,6 +25,7 @@
 //! its hierarchy built beforehand; it has neither `frame_ms` nor `passes`.
 
 pub mod contender;
+pub mod gather;
 pub mod group;
 pub mod pictures;
 pub mod report;

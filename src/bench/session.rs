@@ -182,7 +182,7 @@ fn run_until_done(
 }
 
 /// What differs between settings that should be the same.
-fn difference(kept: &Settings, asked: &Settings) -> Option<String> {
+pub(super) fn difference(kept: &Settings, asked: &Settings) -> Option<String> {
     let size = |s: &Settings| format!("{}x{}", s.width, s.height);
     let pairs = [
         (

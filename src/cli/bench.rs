@@ -161,16 +161,23 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     let contenders = contenders.map_err(|error| CliError::Usage(error.to_string()))?;
     let told = args.shard.settle()?;
     let out = folder(args, told.as_ref().map(|(shard, _)| *shard));
-    let mut jobs = jobs(args, &contenders, &out)?;
+    // Images of all shards go into one folder: their names tell scenes and lights apart.
+    let shared = args.out.clone().unwrap_or_default();
+    let mut jobs = jobs(args, &contenders, &shared)?;
     let all = groups(&jobs);
     if let Some(told) = &told {
         jobs = jobs[run_of(&costs(args, &contenders, &jobs), told.0)].to_vec();
         print_text(&shard::line(told, jobs.len(), "scenes and lights"))?;
     }
-    let images = out.join("images");
+    let images = shared.join("images");
     let created = std::fs::create_dir_all(&images);
     created.map_err(|source| BenchError::Create {
         path: images,
+        source,
+    })?;
+    let created = std::fs::create_dir_all(&out);
+    created.map_err(|source| BenchError::Create {
+        path: out.clone(),
         source,
     })?;
     let page = Output::File(out.join("report.html"));
@@ -205,7 +212,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     if let Some(fault) = fault {
         return Err(fault.into());
     }
-    page.write(report::page(session.results(), &out).as_bytes())?;
+    page.write(report::page(session.results(), &shared).as_bytes())?;
     print_text(&summary(session.results(), &session.file(), &page))?;
     judge(session.results(), session.file())
 }

@@ -13,6 +13,7 @@ mod error;
 mod frames;
 mod graph;
 mod info;
+mod merge;
 mod outputs;
 mod pipeline_cache;
 mod progress;
@@ -64,6 +65,7 @@ enum Command {
     Compare(compare::CompareArgs),
     Bench(Box<bench::BenchArgs>),
     Batch(batch::BatchArgs),
+    Merge(merge::MergeArgs),
 }
 
 /// Runs the program with `arguments`, of which the first is its own name, and returns its exit
@@ -80,6 +82,7 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
             Command::Compare(args) => compare::run(&args),
             Command::Bench(args) => bench::run(&args),
             Command::Batch(args) => batch::run(&args),
+            Command::Merge(args) => merge::run(&args),
         },
         Err(error) => match error.kind() {
             ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {

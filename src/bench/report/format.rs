@@ -1,7 +1,7 @@
 //! Numbers and text for people.
 
 /// Text for HTML and SVG, in elements and in quoted attributes.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

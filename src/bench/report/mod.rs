@@ -10,10 +10,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::results::Results;
-use format::escape;
+pub(crate) use format::escape;
 use plot::Families;
 
-const STYLE: &str = include_str!("report.css");
+pub(crate) const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
 
 /// The page. Images are read from `folder`; one that cannot be read is left out.

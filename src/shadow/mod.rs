@@ -11,6 +11,7 @@ pub mod pcss;
 mod receivers;
 pub mod shaft_masks;
 pub mod silhouettes;
+pub mod ssoc;
 mod technique;
 
 pub use light_params::{LightParams, ViewParams, shape_number};

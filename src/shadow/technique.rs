@@ -7,6 +7,7 @@ use super::occlusion_textures::{self, OcclusionOptions};
 use super::oess::{self, OessOptions};
 use super::pcss::PcssOptions;
 use super::shaft_masks::{self, ShaftOptions};
+use super::ssoc::{self, SsocOptions};
 use super::{ShadowInputs, ShadowMask, hard, pcss};
 use crate::graph::Graph;
 use crate::light::{AreaLight, ShapeKind};
@@ -27,6 +28,8 @@ pub enum Technique {
     Mdi(MdiOptions),
     /// Edges that divide a line light into a part that is seen and one that is not.
     Oess(OessOptions),
+    /// Silhouette edges near a surface's place in the light's image, which hide a part of the light.
+    Ssoc(SsocOptions),
     /// Masks of light samples, from lists of the triangles between each tile and the light.
     ShaftMasks(ShaftOptions),
 }
@@ -135,6 +138,7 @@ impl Technique {
         Self::OcclusionTextures(OcclusionOptions::DEFAULT),
         Self::Mdi(MdiOptions::DEFAULT),
         Self::Oess(OessOptions::DEFAULT),
+        Self::Ssoc(SsocOptions::DEFAULT),
         Self::ShaftMasks(ShaftOptions::DEFAULT),
     ];
 
@@ -147,6 +151,7 @@ impl Technique {
             Self::OcclusionTextures(_) => occlusion_textures::NAME,
             Self::Mdi(_) => mdi::NAME,
             Self::Oess(_) => oess::NAME,
+            Self::Ssoc(_) => ssoc::NAME,
             Self::ShaftMasks(_) => shaft_masks::NAME,
         }
     }
@@ -164,6 +169,9 @@ impl Technique {
             }
             Self::Mdi(_) => {
                 "all surfaces at each texel of a view, in depth buckets, crossed by rays"
+            }
+            Self::Ssoc(_) => {
+                "silhouette edges near a surface's place in the light's image, each hiding a part of it"
             }
             Self::Oess(_) => {
                 "edges seen from both ends of a line light, which hide a part of it from each surface"
@@ -191,6 +199,9 @@ impl Technique {
                 "B. Keating, N. Max: Shadow Penumbras for Complex Objects by Depth-Dependent \
                  Filtering of Multi-Layer Depth Images. Eurographics Workshop on Rendering 1999"
             }
+            Self::Ssoc(_) => {
+                "Q. Mo, V. Popescu, C. Wyman: The Soft Shadow Occlusion Camera. Pacific Graphics 2007"
+            }
             Self::Oess(_) => "C. L. Reimann, B. Dreier: Occluding Edges Soft Shadows",
             Self::ShaftMasks(_) => return None,
         })
@@ -204,6 +215,7 @@ impl Technique {
             }
             Self::OcclusionTextures(_) => occlusion_textures::SHAPES,
             Self::Oess(_) => oess::SHAPES,
+            Self::Ssoc(_) => ssoc::SHAPES,
         }
     }
 
@@ -216,6 +228,7 @@ impl Technique {
             Self::OcclusionTextures(_) => OcclusionOptions::ALL,
             Self::Mdi(_) => MdiOptions::ALL,
             Self::Oess(_) => OessOptions::ALL,
+            Self::Ssoc(_) => SsocOptions::ALL,
             Self::ShaftMasks(_) => ShaftOptions::ALL,
         }
     }
@@ -230,6 +243,7 @@ impl Technique {
             Self::OcclusionTextures(o) => o.values(),
             Self::Mdi(o) => o.values(),
             Self::Oess(o) => o.values(),
+            Self::Ssoc(o) => o.values(),
             Self::ShaftMasks(o) => o.values(),
         };
         let names = self.options().iter().map(|option| option.name);
@@ -243,6 +257,7 @@ impl Technique {
             (Self::OcclusionTextures(o), _) => o.set(option, value)?,
             (Self::Mdi(o), _) => o.set(option, value)?,
             (Self::Oess(o), _) => o.set(option, value)?,
+            (Self::Ssoc(o), _) => o.set(option, value)?,
             (Self::ShaftMasks(o), _) => o.set(option, value)?,
             (Self::Pcf(o) | Self::Pcss(o), "taps") => o.taps = count()?,
             (Self::Pcss(o), "search") => o.search = count()?,
@@ -294,6 +309,7 @@ impl Technique {
             }
             Self::Mdi(options) => mdi::add_passes(graph, inputs, options),
             Self::Oess(options) => oess::add_passes(graph, inputs, options),
+            Self::Ssoc(options) => ssoc::add_passes(graph, inputs, options),
             Self::ShaftMasks(options) => shaft_masks::add_passes(graph, inputs, options),
             Self::Pcf(options) | Self::Pcss(options) => {
                 pcss::add_passes(graph, inputs, self.name(), options)

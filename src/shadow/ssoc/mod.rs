@@ -1,0 +1,275 @@
+//! Technique `ssoc`: the Soft Shadow Occlusion Camera (Q. Mo, V. Popescu, C. Wyman).
+//!
+//! Silhouette edges seen from the light's centre are drawn into two distortion maps, one for what is
+//! inside of the hard shadow and one for what is outside, as bands as wide as the edge's penumbra can
+//! get. A receiver near an edge warps its place in the light's image by how much of the light the
+//! edge hides, and looks there for further edges.
+//!
+//! Published are six values a texel: a point of the edge, its normal, depths before and behind it.
+//! Here a texel holds the number of the edge, and the receiver reads the edge itself: in place of an
+//! image-space estimate the plane through receiver and edge cuts the light, which is exact for
+//! inclined edges too, and no texel of the map shows along it.
+//!
+//! | pass | makes |
+//! |---|---|
+//! | `params` | views |
+//! | `map` | depths seen from the light's centre |
+//! | `silhouettes.*` | the list of edges ([`super::silhouettes`]) |
+//! | `bands` | both distortion maps of a view, side by side |
+//! | `start`, `tiles` | the picture's tiles that need work |
+//! | `visibility` | visibility |
+
+mod options;
+
+pub use options::{Combine, SsocOptions};
+
+use super::light_view::{LightView, LightViews, MAX_LIGHT_VIEWS, light_views};
+use super::map::add_maps_of_size;
+use super::receivers::add_receivers;
+use super::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
+use super::{ShadowInputs, ShadowMask, shape_number};
+use crate::geometry::DrawTarget;
+use crate::gpu::{ComputePipelineDesc, DepthState, GraphicsPipelineDesc, SamplerDesc, spirv};
+use crate::graph::{
+    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, ImagePart, Load, PassKind, Stage,
+};
+use crate::light::{AreaLight, LightShape, ShapeKind};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// The technique's name.
+pub(super) const NAME: &str = "ssoc";
+
+/// Light shapes that it can do.
+pub(super) const SHAPES: &[ShapeKind] = &[
+    ShapeKind::Point,
+    ShapeKind::Disk,
+    ShapeKind::Sphere,
+    ShapeKind::Sun,
+];
+
+/// `SsocParams` in `ssoc/params.glsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+struct SsocParams {
+    counts: [u32; 4],
+    reach: [f32; 4],
+    views: [LightView; MAX_LIGHT_VIEWS],
+}
+
+/// Push constants of `ssoc/bands.vert` and `.frag`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct BandsPush {
+    center: [f32; 4],
+    view: u32,
+}
+
+/// Vertices of an edge's bands: two triangles for its outer side, two for its inner one.
+const VERTICES: u32 = 12;
+
+/// Half width of a band in texels, at least: a receiver's texel may lie that far from the edge.
+const LEAST_TEXELS: f32 = 1.5;
+
+/// Edges nearer to the light than this part of the farthest receiver's distance are cut off.
+const NEAR: f32 = 1.0e-4;
+
+/// Views reach at most this far beyond the receivers, as the tangent of an angle at the light.
+const MOST_MARGIN: f64 = 0.25;
+
+/// Declares the passes.
+pub(super) fn add_passes<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: SsocOptions,
+) -> ShadowMask {
+    let light = inputs.light;
+    let reach = reach(&light);
+    let casters = inputs.scene.bounds();
+    let far = farthest(inputs);
+    let margin = if light.shape.is_sun() {
+        f64::from(reach * casters.radius())
+    } else {
+        f64::from(reach / far.max(f32::MIN_POSITIVE)).min(MOST_MARGIN)
+    };
+    let views = light_views(&light, &inputs.receivers, &casters, margin);
+    let [width, height] = inputs.camera.size();
+    let mut params = SsocParams {
+        counts: [views.views.len() as u32, options.resolution, width, height],
+        reach: [reach, far, far * NEAR, LEAST_TEXELS],
+        ..SsocParams::default()
+    };
+    for (place, view) in params.views.iter_mut().zip(&views.views) {
+        *place = *view;
+    }
+    let buffer = add_params(graph, inputs, params);
+    let depth = DrawTarget::Depth;
+    let map = add_maps_of_size(graph, inputs, NAME, &views, depth, options.resolution).depth;
+    let list = add_silhouettes(graph, inputs, NAME, SilhouetteRule::Center, VERTICES);
+    let bands = add_bands(graph, inputs, &options, &views, buffer, map, list);
+    add_visibility(graph, inputs, &options, buffer, map, bands)
+}
+
+/// Distance from the light's centre to its farthest point, metres; of a sun at distance 1.
+fn reach(light: &AreaLight) -> f32 {
+    match light.shape {
+        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
+        shape => shape.bounding_radius(),
+    }
+}
+
+/// Distance of the farthest receiver from the light's centre; of a sun the depth along its
+/// direction.
+fn farthest(inputs: &ShadowInputs<'_>) -> f32 {
+    let center = inputs.light.center.as_dvec3();
+    let direction = inputs.light.direction.as_dvec3();
+    let points = inputs.receivers.iter().flatten();
+    if inputs.light.shape.is_sun() {
+        let depths = points.map(|p| p.dot(direction));
+        return depths.fold(f64::NEG_INFINITY, f64::max).max(-1.0e30) as f32;
+    }
+    points.map(|p| p.distance(center)).fold(0.0, f64::max) as f32
+}
+
+fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: SsocParams) -> BufferId {
+    let name = &inputs.light_name;
+    let size = size_of::<SsocParams>() as u64;
+    let buffer = graph.create_buffer(format!("{NAME}.params {name}"), BufferDesc { size });
+    let mut pass = graph.pass(format!("{NAME}.params {name}"), PassKind::Transfer);
+    let buffer = pass.overwrite(buffer, Access::Clear);
+    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
+    buffer
+}
+
+/// The distortion maps: R32_UINT, one more than the number of the edge, 0 for none; the outer map in
+/// the left half, the inner one in the right half, a layer for each view.
+fn add_bands(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    options: &SsocOptions,
+    views: &LightViews,
+    params: BufferId,
+    map: ImageId,
+    list: Silhouettes,
+) -> ImageId {
+    let name = &inputs.light_name;
+    let layers = views.views.len().max(1) as u32;
+    let side = if views.views.is_empty() {
+        1
+    } else {
+        options.resolution
+    };
+    let image = |format| ImageDesc::new(format, 2 * side, side);
+    let numbers = image(vk::Format::R32_UINT).layers(layers);
+    let mut bands = graph.create_image(format!("{NAME}.bands {name}"), numbers);
+    let center = if inputs.light.shape.is_sun() {
+        Vec3::ZERO
+    } else {
+        inputs.light.center
+    };
+    let (edges, points) = (inputs.ids.edges, inputs.ids.points);
+    for layer in 0..layers {
+        let part = ImagePart::layer(layer);
+        // Distance to the edge, as a depth: greater is nearer.
+        let apart = image(vk::Format::D32_SFLOAT);
+        let apart = graph.create_image(format!("{NAME}.bands_apart {name}.{layer}"), apart);
+        let mut pass = graph.pass(format!("{NAME}.bands {name}.{layer}"), PassKind::Graphics);
+        bands = pass.color_part(bands, part, Load::Clear([0.0; 4]));
+        let _ = pass.depth(apart, Load::Clear([0.0; 4]));
+        if views.views.is_empty() {
+            continue;
+        }
+        list.read(&mut pass, inputs);
+        pass.read(params, Access::Uniform(Stage::Vertex));
+        pass.read(params, Access::Uniform(Stage::Fragment));
+        pass.read_part(map, part, Access::Sampled(Stage::Fragment));
+        let push = BandsPush {
+            center: center.extend(0.0).to_array(),
+            view: layer,
+        };
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let fragment = Some(&spirv::SSOC_BANDS_FRAG);
+            let mut pipeline = GraphicsPipelineDesc::new(&spirv::SSOC_BANDS_VERT, fragment);
+            pipeline.depth = Some(DepthState {
+                compare: vk::CompareOp::GREATER,
+                write: true,
+            });
+            let bindings = [
+                Bind::uniform(0, params),
+                Bind::sampled(1, list.list, nearest),
+                Bind::sampled(2, edges, nearest),
+                Bind::sampled(3, points, nearest),
+                Bind::sampled(4, map, nearest).part(part),
+            ];
+            ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&push))?;
+            list.draw(ctx)
+        });
+    }
+    bands
+}
+
+fn add_visibility<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: &SsocOptions,
+    params: BufferId,
+    map: ImageId,
+    bands: ImageId,
+) -> ShadowMask {
+    let name = &inputs.light_name;
+    let receivers = add_receivers(graph, inputs, NAME, reach(&inputs.light));
+    let list = receivers.list;
+    let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
+    let (view_params, part) = inputs.view_params;
+    let mut pass = graph.pass(format!("{NAME}.visibility {name}"), PassKind::Compute);
+    pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+    pass.read(params, Access::Uniform(Stage::Compute));
+    let images = [
+        gbuffer.view_depth,
+        gbuffer.geometric_normal,
+        map,
+        bands,
+        ids.edges,
+        ids.points,
+    ];
+    for image in images {
+        pass.read(image, Access::Sampled(Stage::Compute));
+    }
+    list.read(&mut pass);
+    let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
+    let shape = shape_number(&inputs.light.shape);
+    let options = *options;
+    pass.record(move |ctx| {
+        let nearest = SamplerDesc::nearest();
+        let bindings = [
+            Bind::uniform(0, view_params).part(part),
+            Bind::uniform(1, params),
+            Bind::sampled(2, gbuffer.view_depth, nearest),
+            Bind::sampled(3, gbuffer.geometric_normal, nearest),
+            Bind::sampled(4, map, nearest).array(),
+            Bind::sampled(5, bands, nearest).array(),
+            Bind::sampled(6, ids.edges, nearest),
+            Bind::sampled(7, ids.points, nearest),
+            Bind::storage_image(8, visibility),
+            Bind::uniform(9, list.arguments),
+            Bind::sampled(10, list.tiles, nearest),
+        ];
+        let steps = ctx.gpu().info().limits.sub_pixel_precision_bits.min(16);
+        let snap = 4.0 / (1u32 << steps) as f32;
+        let pipeline = ComputePipelineDesc {
+            constants: vec![
+                (0, shape),
+                (1, options.lookups),
+                (2, options.combine as u32),
+                (3, u32::from(options.cubic)),
+                (4, snap.to_bits()),
+            ],
+            ..ComputePipelineDesc::new(&spirv::SSOC_VISIBILITY_COMP)
+        };
+        ctx.bind_compute(&pipeline, &bindings, &[])?;
+        list.dispatch(ctx)
+    });
+    ShadowMask::new(visibility)
+}

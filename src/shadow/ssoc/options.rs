@@ -1,0 +1,124 @@
+//! Options of `ssoc`.
+
+use crate::shadow::TechniqueOption;
+
+/// How the visibilities of two edges join.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Combine {
+    /// Light passes either of two edges where each lies on the other's inner side and their depths
+    /// agree, as at a convex corner or a strip; else it must pass both.
+    Rule,
+    /// The product, as published.
+    Product,
+    /// The least.
+    Min,
+    /// It must pass both.
+    And,
+    /// It may pass either.
+    Or,
+}
+
+const COMBINE: [(&str, Combine); 5] = [
+    ("rule", Combine::Rule),
+    ("product", Combine::Product),
+    ("min", Combine::Min),
+    ("and", Combine::And),
+    ("or", Combine::Or),
+];
+
+/// Options of `ssoc`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SsocOptions {
+    /// Texels across and down the shadow map and each distortion map, 64 to 4096.
+    pub resolution: u32,
+    /// Places of the distortion maps that a pixel looks at, 1 to 6; beyond the first in both maps.
+    pub lookups: u32,
+    /// How the visibilities of two edges join.
+    pub combine: Combine,
+    /// `3 t^2 - 2 t^3` of the hidden part of the diameter, as published, instead of the light's area.
+    pub cubic: bool,
+}
+
+impl SsocOptions {
+    /// What the technique does without options.
+    pub const DEFAULT: Self = Self {
+        resolution: 1024,
+        lookups: 4,
+        combine: Combine::Rule,
+        cubic: false,
+    };
+
+    /// What can be set.
+    pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
+        option(
+            "resolution",
+            "1024",
+            "64 to 4096",
+            "texels across and down the shadow map and each distortion map",
+        ),
+        option(
+            "lookups",
+            "4",
+            "1 to 6",
+            "places of the distortion maps that a pixel looks at",
+        ),
+        option(
+            "combine",
+            "rule",
+            "rule (by how the edges lie), product (as published), min, and, or",
+            "how the visibilities of two edges join",
+        ),
+        option(
+            "area",
+            "exact",
+            "exact or cubic (3 t^2 - 2 t^3, as published)",
+            "part of the light beyond an edge",
+        ),
+    ];
+
+    /// The values, in the order of [`ALL`](Self::ALL).
+    pub(in crate::shadow) fn values(&self) -> Vec<String> {
+        let combine = COMBINE.iter().find(|(_, combine)| *combine == self.combine);
+        vec![
+            self.resolution.to_string(),
+            self.lookups.to_string(),
+            combine.map_or("", |(name, _)| name).to_string(),
+            if self.cubic { "cubic" } else { "exact" }.to_string(),
+        ]
+    }
+
+    /// Sets one; `None` for a value that it does not take.
+    pub(in crate::shadow) fn set(&mut self, option: &str, value: &str) -> Option<()> {
+        let number = |range: std::ops::RangeInclusive<u32>| {
+            value.parse::<u32>().ok().filter(|n| range.contains(n))
+        };
+        match option {
+            "resolution" => self.resolution = number(64..=4096)?,
+            "lookups" => self.lookups = number(1..=6)?,
+            "combine" => self.combine = COMBINE.iter().find(|(name, _)| *name == value)?.1,
+            "area" => {
+                self.cubic = match value {
+                    "exact" => false,
+                    "cubic" => true,
+                    _ => return None,
+                }
+            }
+            _ => return None,
+        }
+        Some(())
+    }
+}
+
+const fn option(
+    name: &'static str,
+    default: &'static str,
+    values: &'static str,
+    what: &'static str,
+) -> TechniqueOption {
+    TechniqueOption {
+        name,
+        default,
+        values,
+        what,
+    }
+}

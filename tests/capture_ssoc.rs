@@ -1,0 +1,254 @@
+//! `ssoc` against closed forms and sampled truth: half-planes, tilted receivers, strips, squares, and
+//! balls under disks, spheres and a sun.
+
+mod support;
+
+use antumbra::capture::{FrameRenderer, FrameRequest};
+use antumbra::light::LightShape;
+use antumbra::scene::{Primitive, Scene};
+use glam::Vec3;
+use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, quad, scene};
+
+const DISK: LightShape = LightShape::Disk { radius: 1.0 };
+
+/// Places on a unit disk, evenly over its area.
+fn disk(count: u32) -> impl Iterator<Item = [f32; 2]> {
+    (0..count).map(move |i| {
+        let radius = ((i as f32 + 0.5) / count as f32).sqrt();
+        let turn = 2.399_963_2 * i as f32;
+        [radius * turn.cos(), radius * turn.sin()]
+    })
+}
+
+fn render(scene: &Scene, techniques: &[&str]) -> Vec<Vec<f32>> {
+    let mut renderer = FrameRenderer::new(support::gpu(), scene).unwrap();
+    let images = techniques.iter().map(|technique| {
+        let request = FrameRequest {
+            camera: camera(),
+            size: [SIZE; 2],
+            lights: vec![0],
+            technique: technique.parse().unwrap(),
+        };
+        let mut frame = renderer.render(&request).unwrap();
+        frame.lights.remove(0).visibility
+    });
+    let images = images.collect();
+    support::assert_no_messages(&renderer.destroy().unwrap());
+    images
+}
+
+/// Part of a level disk light that level rectangles (depth, x range, z range) leave free of a point.
+fn truth(p: Vec3, radius: f32, plates: &[(f32, [f32; 2], [f32; 2])], samples: u32) -> f32 {
+    let free = disk(samples).filter(|[u, v]| {
+        let from = Vec3::new(radius * u, HEIGHT, radius * v);
+        plates.iter().all(|(depth, x, z)| {
+            let at = from + (p - from) * (depth / (HEIGHT - p.y));
+            at.x < x[0] || at.x > x[1] || at.z < z[0] || at.z > z[1]
+        })
+    });
+    free.count() as f32 / samples as f32
+}
+
+const ENDLESS: [f32; 2] = [-30.0, 30.0];
+
+fn under(plates: &[(f32, [f32; 2], [f32; 2])], shape: LightShape) -> Scene {
+    let plates = plates
+        .iter()
+        .map(|(depth, x, z)| plate("blocker", *x, *z, *depth));
+    let all: Vec<Primitive> = std::iter::once(floor()).chain(plates).collect();
+    scene(all, shape)
+}
+
+/// Root mean square and largest error over a picture of the floor, every `step`-th pixel.
+fn errors(image: &[f32], step: u32, truth: impl Fn(Vec3) -> f32) -> (f32, f32) {
+    let (mut squares, mut worst, mut count) = (0.0, 0.0_f32, 0);
+    for y in (0..SIZE).step_by(step as usize) {
+        for x in (0..SIZE).step_by(step as usize) {
+            // -Z is up in the picture, so rows go along +Z.
+            let p = Vec3::new(floor_x(x), 0.0, floor_x(y));
+            let error = (image[(y * SIZE + x) as usize] - truth(p)).abs();
+            squares += error * error;
+            worst = worst.max(error);
+            count += 1;
+        }
+    }
+    ((squares / count as f32).sqrt(), worst)
+}
+
+/// What 20,000 samples of a disk are off by at an edge.
+const SAMPLED: f32 = 0.002;
+
+/// B1: one straight edge, level or not, parallel to the light or not.
+#[test]
+fn a_half_plane_is_exact() {
+    let _one = support::serial();
+    for (depth, x) in [
+        (5.0, [-30.0, 0.0]),
+        (2.0, [0.05, 30.0]),
+        (8.0, [-30.0, 0.3]),
+    ] {
+        let plates = [(depth, x, ENDLESS)];
+        let images = render(&under(&plates, DISK), &["ssoc", "ssoc:area=cubic"]);
+        let row: Vec<f32> = (0..SIZE)
+            .map(|i| truth(Vec3::new(floor_x(i), 0.0, 0.0), 1.0, &plates, 20_000))
+            .collect();
+        let worst = images.iter().map(|image| {
+            let errors = image.iter().enumerate();
+            let errors = errors.map(|(i, v)| (v - row[i % SIZE as usize]).abs());
+            errors.fold(0.0, f32::max)
+        });
+        let worst: Vec<f32> = worst.collect();
+        println!("depth {depth}: {worst:?}");
+        assert!(worst[0] <= 0.003 + SAMPLED, "depth {depth}: {}", worst[0]);
+        assert!(worst[1] <= 0.042 + SAMPLED, "depth {depth}: {}", worst[1]);
+    }
+}
+
+/// B2: from full shadow to full light as far as the light's size says.
+#[test]
+fn the_penumbra_has_its_width() {
+    let _one = support::serial();
+    // A light of 0.6 m, of which the floor shows 2 r (H - h) / h.
+    let (radius, depth) = (0.6, 4.0);
+    let plates = [(depth, [-30.0, 0.0], ENDLESS)];
+    let image = &render(&under(&plates, LightShape::Disk { radius }), &["ssoc"])[0];
+    let row = &image[(SIZE * SIZE / 2) as usize..][..SIZE as usize];
+    let partly = row.iter().filter(|v| **v > 0.0 && **v < 1.0).count() as f32;
+    let pixel = 3.2 / SIZE as f32;
+    let wanted = 2.0 * radius * (HEIGHT - depth) / depth;
+    assert!(
+        (partly * pixel - wanted).abs() <= 2.0 * pixel,
+        "{}",
+        partly * pixel
+    );
+}
+
+/// B3: a receiver inclined by 60 degrees does not shadow itself and has the penumbra of its points.
+#[test]
+fn a_steep_receiver_is_lit_up_to_the_penumbra() {
+    let _one = support::serial();
+    let tangent = 3.0_f32.sqrt();
+    let at = |x: f32, z: f32| Vec3::new(x, x * tangent, z);
+    let slope = quad(
+        "slope",
+        [at(-3.0, -9.0), at(-3.0, 9.0), at(1.2, 9.0), at(1.2, -9.0)],
+    );
+    let plates = [(5.0, [-30.0, 0.0], ENDLESS)];
+    let mut under = under(&plates, DISK);
+    under.primitives[0] = slope;
+    under.finish().unwrap();
+    let image = &render(&under, &["ssoc"])[0];
+    let mut worst = 0.0_f32;
+    for y in [8, 32, 50] {
+        for i in 24..SIZE {
+            let k = floor_x(i) / 2.0;
+            let x = 2.0 * k / (1.0 + k * tangent);
+            let z = floor_x(y) / 2.0 * (2.0 - x * tangent);
+            let wanted = truth(at(x, z), 1.0, &plates, 20_000);
+            let found = image[(y * SIZE + i) as usize];
+            worst = worst.max((found - wanted).abs());
+            assert!(wanted < 1.0 || found >= 0.99, "{i}: {found}");
+        }
+    }
+    println!("steep: {worst}");
+    assert!(worst <= 0.01, "{worst}");
+}
+
+/// B4: both sides of a strip, and the corner of a square.
+#[test]
+fn strips_add_up_and_corners_are_close() {
+    let _one = support::serial();
+    let strip = [(5.0, [-0.25, 0.25], ENDLESS)];
+    let images = render(
+        &under(&strip, DISK),
+        &["ssoc", "ssoc:lookups=1", "ssoc:combine=product"],
+    );
+    let measured = images
+        .iter()
+        .map(|i| errors(i, 4, |p| truth(p, 1.0, &strip, 20_000)));
+    let measured: Vec<_> = measured.collect();
+    println!("strip: {measured:?}");
+    assert!(measured[0].1 <= 0.02, "{:?}", measured[0]);
+    assert!(
+        measured[1].1 > 0.1 && measured[2].1 > 0.1,
+        "the options do nothing: {measured:?}"
+    );
+
+    let corner = [(5.0, [-30.0, 0.0], [-30.0, 0.0])];
+    let images = render(&under(&corner, DISK), &["ssoc", "ssoc:lookups=1"]);
+    let measured = images
+        .iter()
+        .map(|i| errors(i, 3, |p| truth(p, 1.0, &corner, 20_000)));
+    let measured: Vec<_> = measured.collect();
+    println!("corner: {measured:?}");
+    assert!(measured[0].1 <= 0.03, "{:?}", measured[0]);
+}
+
+/// A ball of `rings` rings around `middle`.
+fn ball(middle: Vec3, radius: f32, rings: u32) -> Primitive {
+    let sectors = 2 * rings;
+    let mut mesh = Primitive {
+        name: "ball".to_string(),
+        ..Primitive::default()
+    };
+    for i in 0..=rings {
+        for j in 0..sectors {
+            let (polar, turn) = (i as f32 / rings as f32, j as f32 / sectors as f32);
+            let (s, c) = (polar * std::f32::consts::PI).sin_cos();
+            let (sine, cosine) = (turn * std::f32::consts::TAU).sin_cos();
+            let normal = Vec3::new(s * cosine, c, s * sine);
+            mesh.normals.push(normal);
+            mesh.positions.push(middle + radius * normal);
+        }
+    }
+    let corner = |i: u32, j: u32| i * sectors + j % sectors;
+    for (i, j) in (0..rings).flat_map(|i| (0..sectors).map(move |j| (i, j))) {
+        let [a, b] = [corner(i, j), corner(i, j + 1)];
+        let [c, d] = [corner(i + 1, j), corner(i + 1, j + 1)];
+        mesh.indices.extend([a, b, c, b, d, c]);
+    }
+    mesh
+}
+
+/// B5: a sphere light of 0.27 of its distance, seen past a ball.
+#[test]
+fn a_large_sphere_light_behind_a_ball() {
+    let _one = support::serial();
+    let (middle, radius, light) = (Vec3::new(-2.0, 5.0, 0.0), 2.0, 1.35);
+    let shape = LightShape::Sphere { radius: light };
+    let scene = scene(vec![floor(), ball(middle, radius, 64)], shape);
+    let image = &render(&scene, &["ssoc"])[0];
+    let center = Vec3::new(0.0, HEIGHT, 0.0);
+    let seen = |p: Vec3| {
+        let to = center - p;
+        let d = to.length();
+        let (axis, r) = (to / d, light * (1.0 - light * light / (d * d)).sqrt());
+        let x = axis.any_orthonormal_vector();
+        let y = axis.cross(x);
+        let from = p + axis * (d - light * light / d);
+        let free = disk(4000).filter(|[u, v]| {
+            let way = (from + (x * *u + y * *v) * r - p).normalize();
+            let along = (middle - p).dot(way);
+            (p + way * along).distance(middle) > radius
+        });
+        free.count() as f32 / 4000.0
+    };
+    let (rms, worst) = errors(image, 4, seen);
+    println!("ball: rms {rms}, largest {worst}");
+    assert!(rms <= 0.02, "{rms}");
+}
+
+#[test]
+fn a_light_of_no_size_is_hard_and_nothing_is_full_light() {
+    let _one = support::serial();
+    let plates = [(5.0, [-0.3, 0.2], [-0.5, 0.1])];
+    let small = LightShape::Disk { radius: 1.0e-6 };
+    let images = render(&under(&plates, small), &["ssoc", "hard"]);
+    let off = images[0].iter().zip(&images[1]);
+    let off = off.filter(|(a, b)| (*a - *b).abs() > 1.0e-3).count();
+    assert!(off <= 2, "{off} pixels differ");
+    let empty = render(&under(&[], DISK), &["ssoc"]);
+    assert!(empty[0].iter().all(|v| *v == 1.0));
+    let covered = render(&under(&[(5.0, [-9.0, 9.0], [-9.0, 9.0])], DISK), &["ssoc"]);
+    assert!(covered[0].iter().all(|v| *v == 0.0));
+}

@@ -1,4 +1,4 @@
-.PHONY: help demo test bench bench-check bench-plan slurm-test cluster-check clean-deps
+.PHONY: help demo test bench bench-check bench-plan bench-batch slurm-test cluster-check clean-deps
 
 # For make bench: scenes, what is held against each other, picture size, and where it goes.
 SCENES ?= assets
@@ -18,6 +18,7 @@ help:
 	@echo "make bench       run time against error of all techniques over all scenes, to out/bench/"
 	@echo "make bench-check look at out/bench/report.html in headless Chromium"
 	@echo "make bench-plan  criterion benchmarks of the render graph"
+	@echo "make bench-batch throughput of a batch against a process for each item"
 	@echo "make slurm-test  32 tasks of a real Slurm on this machine against one process; needs root"
 	@echo "make cluster-check  the Kubernetes manifest against its schema"
 	@echo "make clean-deps  remove what set-up unpacked into .deps/"
@@ -45,6 +46,11 @@ bench-check:
 bench-plan:
 	scripts/setup.sh demo
 	cargo bench
+
+bench-batch:
+	scripts/setup.sh demo
+	cargo build --release
+	scripts/bench_batch.py $(BIN)
 
 slurm-test:
 	cargo build --release

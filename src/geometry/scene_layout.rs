@@ -267,7 +267,7 @@ pub(super) fn is_cut_out(scene: &Scene, primitive: &Primitive) -> bool {
     kind_of(scene, primitive).is_none()
 }
 
-/// Width and height in texels of an image of [`IMAGE_WIDTH`] that holds a number of things.
+/// Width and height in texels of an image of `IMAGE_WIDTH` that holds a number of things.
 pub fn image_place(count: usize) -> [u32; 2] {
     [
         IMAGE_WIDTH as u32,

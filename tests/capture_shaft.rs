@@ -4,7 +4,7 @@ mod support;
 
 use antumbra::capture::{CapturedImage, FrameRenderer, FrameRequest, Samples};
 use antumbra::light::AreaLight;
-use antumbra::reference::{Pattern, Reference, Sampling, Settings};
+use antumbra::reference::{Pattern, Reference, Sampling, Settings, Surface};
 use antumbra::scene::{LoadOptions, Scene, SceneCamera};
 use antumbra::shadow::shaft_masks::light_samples;
 use glam::{DVec3, UVec2};
@@ -19,14 +19,14 @@ fn load(name: &str) -> Scene {
     Scene::load(&path, &LoadOptions::default()).unwrap()
 }
 
-/// Visibility of every light, and the normals, for each technique. One renderer serves all scenes, so
+/// Visibility of every light, and the surfaces, for each technique. One renderer serves all scenes, so
 /// that pipelines are made once.
 fn render(
     renderer: &mut FrameRenderer<'static>,
     scene: &Scene,
     camera: &SceneCamera,
     techniques: &[&str],
-) -> Vec<(Vec<Vec<f32>>, Vec<DVec3>)> {
+) -> Vec<(Vec<Vec<f32>>, Surfaces)> {
     renderer.set_scene(scene.clone()).unwrap();
     let images = techniques.iter().map(|technique| {
         let request = FrameRequest {
@@ -35,22 +35,41 @@ fn render(
             lights: (0..scene.lights.len()).collect(),
             technique: technique.parse().unwrap(),
         };
-        let frame = renderer.render_with_images(&request, &["normal"]).unwrap();
+        let frame = renderer
+            .render_with_images(&request, &["normal", "depth"])
+            .unwrap();
         let lights = frame.lights.into_iter().map(|light| light.visibility);
-        (lights.collect(), normals(&frame.images[0]))
+        (lights.collect(), Surfaces::of(&frame.images))
     });
     images.collect()
 }
 
-fn normals(image: &CapturedImage) -> Vec<DVec3> {
-    let plane = |i: usize| match &image.planes[i] {
-        Samples::Float(values) => values.iter().map(|v| f64::from(*v)),
-        other => panic!("{other:?}"),
-    };
-    let xy = plane(0).zip(plane(1));
-    xy.zip(plane(2))
-        .map(|((x, y), z)| DVec3::new(x, y, z))
-        .collect()
+/// What was drawn at each pixel.
+struct Surfaces {
+    normals: Vec<DVec3>,
+    /// Metres along the view.
+    depths: Vec<f64>,
+}
+
+impl Surfaces {
+    fn of(images: &[CapturedImage]) -> Self {
+        let plane = |image: usize, i: usize| match &images[image].planes[i] {
+            Samples::Float(values) => values.iter().map(|v| f64::from(*v)),
+            other => panic!("{other:?}"),
+        };
+        let xyz = plane(0, 0).zip(plane(0, 1)).zip(plane(0, 2));
+        Self {
+            normals: xyz.map(|((x, y), z)| DVec3::new(x, y, z)).collect(),
+            depths: plane(1, 0).collect(),
+        }
+    }
+
+    /// Whether a pixel shows another surface than the ray through its centre meets. Stored normals
+    /// are rounded by 4e-5.
+    fn is_other(&self, pixel: usize, met: &Surface) -> bool {
+        met.normal.distance(self.normals[pixel]) > 1.0e-3
+            || (self.depths[pixel] - met.depth).abs() > 1.0e-3 * met.depth
+    }
 }
 
 /// Rays to the samples that the technique takes: visibility, and where it can be compared.
@@ -76,7 +95,7 @@ fn cast(
 
 /// Compares with rays. Rasterisation may find another triangle than the ray through a pixel's centre
 /// where that passes within a sub-texel step of an edge, and then shades a point beyond that
-/// triangle: such pixels are told by their normals, and are few.
+/// triangle: such pixels are told by their normals and depths, and are few.
 fn check(renderer: &mut FrameRenderer<'static>, name: &str, side: u32) {
     let scene = load(name);
     let camera = scene.select_camera(None).unwrap();
@@ -84,7 +103,7 @@ fn check(renderer: &mut FrameRenderer<'static>, name: &str, side: u32) {
     let technique = format!("shaft-masks:samples={samples}");
     let images = render(renderer, &scene, &camera, &[&technique]);
     let reference = Reference::new(&scene).unwrap();
-    let (images, normals) = &images[0];
+    let (images, surfaces) = &images[0];
     for (image, light) in images.iter().zip(&scene.lights) {
         let (truth, valid) = cast(&reference, &camera, &light.light, side);
         let (mut pixels, mut partly, mut bits, mut off, mut others) = (0, 0, 0.0, 0, 0);
@@ -99,8 +118,7 @@ fn check(renderer: &mut FrameRenderer<'static>, name: &str, side: u32) {
             }
             let pixel = UVec2::new(index as u32 % SIZE[0], index as u32 / SIZE[0]);
             let surface = reference.surface(&camera, SIZE, pixel).unwrap();
-            // Stored normals are rounded by 4e-5.
-            if surface.normal.distance(normals[index]) > 1.0e-3 {
+            if surfaces.is_other(index, &surface) {
                 others += 1;
                 continue;
             }

@@ -64,10 +64,10 @@ impl Surfaces {
         }
     }
 
-    /// Whether a pixel shows another surface than the ray through its centre meets. Stored normals
-    /// are rounded by 4e-5.
+    /// Whether a pixel shows another triangle than the ray through its centre meets. Stored normals
+    /// are off by less than 7e-5; those of a smooth mesh's neighbours differ by little more.
     fn is_other(&self, pixel: usize, met: &Surface) -> bool {
-        met.normal.distance(self.normals[pixel]) > 1.0e-3
+        met.normal.distance(self.normals[pixel]) > 1.0e-4
             || (self.depths[pixel] - met.depth).abs() > 1.0e-3 * met.depth
     }
 }
@@ -134,10 +134,11 @@ fn check(renderer: &mut FrameRenderer<'static>, name: &str, side: u32) {
         );
         assert!(pixels > 1000, "{name}: there is something to measure");
         assert!(part <= MOST, "{name}, `{}`: {part}", light.name);
-        assert!(
-            f64::from(others) <= (1.0e-3 * f64::from(pixels)).max(2.0),
-            "{name}: {others}"
-        );
+        // The fewer sub-texel steps, the more centres lie within one of an edge: 0.1 % of pixels at
+        // 256 steps, 0.4 % at SwiftShader's 16, among them all wires of the fences.
+        let bits = renderer.gpu().info().limits.sub_pixel_precision_bits;
+        let most = f64::from(pixels) * (8.0e-4 + 0.0512 / f64::from(1_u32 << bits.min(16)));
+        assert!(f64::from(others) <= most.max(2.0), "{name}: {others}");
     }
 }
 

@@ -40,6 +40,16 @@ layout(set = 0, binding = 15, std430) buffer TaskArguments {
 };
 // Tile, chunk and number of the first entry.
 layout(set = 0, binding = 16, rgba32ui) uniform writeonly uimage2D tasks;
+layout(set = 0, binding = 17, std430) buffer PartialArguments {
+    TileArguments partial;
+};
+layout(set = 0, binding = 18, r32ui) uniform writeonly uimage2D partial_list;
+
+// A software driver may end loops after 65,535 turns of all lanes of a vector together: a walk ends
+// itself before, and the passes on lists take it up where it ended.
+const uint MOST_STEPS = 24576u;
+// Pairs of corners that one walk looks at, of up to 16 lanes of a vector one after the other.
+const uint MOST_LOOKS = 2048u;
 
 vec4 fetch_triangle_texel(uint texel) {
     return texelFetch(triangles, triangle_texel_place(texel), 0);
@@ -76,15 +86,16 @@ bool sees_through(vec3 p, vec3 l, vec3 a, vec3 b, vec3 c, vec3 normal, float mar
 
 // Whether the triangle is between all of the tile and all of the light: sides of edges are bilinear in
 // the two ends of a segment, so corners decide.
-bool covers(uvec2 tile, TileBounds bounds, mat3 frame, vec3 a, vec3 b, vec3 c, vec4 plane) {
+bool covers(uvec2 tile, TileBounds bounds, mat3 frame, vec3 a, vec3 b, vec3 c, vec4 plane, inout uint looks) {
     vec3 p = tile_corner(view.camera, tile, bounds, 0u);
     vec3 extent = max(abs(a), max(abs(p), LIGHT_SHAPE == LIGHT_SUN ? vec3(0.0) : abs(view.light.center.xyz)));
     float margin_m = POSITION_ROUNDING * max(extent.x, max(extent.y, extent.z));
-    bool all_through = !material_is_masked(plane.w)
+    bool all_through = !material_is_masked(plane.w) && looks + 64u <= MOST_LOOKS
         && sees_through(p, view.light.center.xyz, a, b, c, plane.xyz, margin_m);
     for (uint i = 0u; i < 64u && all_through; ++i) {
         p = tile_corner(view.camera, tile, bounds, i & 7u);
         vec3 l = light_corner(view.light, frame, i >> 3);
+        looks += 1u;
         all_through = sees_through(p, l, a, b, c, plane.xyz, margin_m);
     }
     return all_through;
@@ -111,7 +122,10 @@ void main() {
     uint slot = CHUNK;
     bool dark = false;
     uint node = 0u;
+    uint steps = 0u;
+    uint looks = 0u;
     while (node < nodes) {
+        steps += 1u;
         vec4 low = fetch_node_low(node);
         uint next = node + 1u;
         if (low.w >= 0.0) {
@@ -121,7 +135,7 @@ void main() {
             vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
             if (shaft_meets_triangle(shaft, a, b, c)) {
                 vec4 plane = fetch_triangle_texel(4u * triangle + 3u);
-                dark = covers(tile, bounds, frame, a, b, c, plane);
+                dark = covers(tile, bounds, frame, a, b, c, plane, looks);
                 if (slot == CHUNK) {
                     uint fresh = atomicAdd(chunks_used, 1u);
                     if (fresh >= params.counts.w) {
@@ -152,6 +166,10 @@ void main() {
             next = uint(-low.w);
         }
         node = next;
+        if (steps == MOST_STEPS && node < nodes) {
+            found.resume = min(found.resume, node);
+            node = nodes;
+        }
     }
 
     bool lit = found.count == 0u && found.resume == nodes && shaft.low.w > 0.0;
@@ -167,6 +185,12 @@ void main() {
         atomicMax(penumbra.groups_x, min(at + 1u, TILE_ROW));
         atomicMax(penumbra.groups_y, at / TILE_ROW + 1u);
         imageStore(penumbra_list, tile_entry_place(at, tiles), uvec4(entry));
+        if (found.resume < nodes) {
+            at = atomicAdd(partial.count, 1u);
+            atomicMax(partial.groups_x, min(at + 1u, TILE_ROW));
+            atomicMax(partial.groups_y, at / TILE_ROW + 1u);
+            imageStore(partial_list, tile_entry_place(at, tiles), uvec4(entry));
+        }
     }
     uint state = lit || dark ? TILE_SETTLED : TILE_OPEN;
     imageStore(lists, ivec2(tile), uvec4(found.chunk, found.count, found.resume, state));

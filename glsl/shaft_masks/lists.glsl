@@ -1,9 +1,11 @@
 // Lists of the triangles that meet a tile's shaft: chunks of a pool, linked, so that a list may have
-// any length. Where the pool is used up, a list says from which node on it does not know.
+// any length. Where the pool is used up, or a walk long, a list says from which node on it does not
+// know.
 //
 // A long list is worked on in tasks of a fixed number of chunks. The first one is its tile's; the
-// others OR what they find to the tile's masks in memory. That spreads the work, and a software driver
-// may end loops that go on for long.
+// others OR what they find to the tile's masks in memory. What a list does not know is found again
+// in the hierarchy, by tasks of a fixed number of nodes. That spreads the work, and a software
+// driver may end loops that go on for long.
 #ifndef ANTUMBRA_SHAFT_MASKS_LISTS_GLSL
 #define ANTUMBRA_SHAFT_MASKS_LISTS_GLSL
 

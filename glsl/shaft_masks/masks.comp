@@ -1,6 +1,6 @@
 #version 460
-// Masks of the listed tiles, or of tasks on the rest of long lists: a workgroup each, four pixels an
-// invocation, so that each fetch of a triangle serves four.
+// Masks of the listed tiles, of tasks on the rest of long lists, or of runs of nodes that lists do not
+// know: a workgroup each, four pixels an invocation, so that each fetch of a triangle serves four.
 
 #include "common/camera.glsl"
 #include "common/tiles.glsl"
@@ -33,8 +33,14 @@ layout(set = 0, binding = 14, r32f) uniform writeonly image2D visibility;
 layout(set = 0, binding = 15) uniform usampler2D tasks;
 layout(set = 0, binding = 16, r32ui) uniform uimage2D words;
 
+const uint STEP_TILES = 0u;
+const uint STEP_FURTHER = 1u;
+const uint STEP_WALK = 2u;
+
 layout(push_constant) uniform Push {
-    uint further; // 1 for tasks
+    uint step;      // one of the above
+    uint first_run; // of nodes, of this dispatch
+    uint run;       // nodes of a run
 } push;
 
 #define SUN_TANGENT_SQUARE (view.light.axis_x.w * view.light.axis_x.w)
@@ -95,7 +101,7 @@ void store(uint tile, uvec2 pixel, MaskReceiver receiver, uint blocked[ROWS], bo
             bits |= (blocked[word * ROWS_IN_WORD + i] & ALL_COLUMNS) << (i * COLUMNS);
         }
         ivec2 place = word_place(tile, pixel % TILE_SIZE, word);
-        if (push.further != 0u) {
+        if (push.step != STEP_TILES) {
             imageAtomicOr(words, place, receiver.id == 0u ? 0u : bits);
         } else {
             imageStore(words, place, uvec4(receiver.id == 0u ? 0u : bits));
@@ -109,7 +115,7 @@ void main() {
         return;
     }
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
-    uvec4 task = push.further != 0u ? texelFetch(tasks, task_place(index), 0)
+    uvec4 task = push.step == STEP_FURTHER ? texelFetch(tasks, task_place(index), 0)
         : texelFetch(list, tile_entry_place(index, tiles), 0);
     uvec2 tile = tile_of_entry(task.x, tiles);
     uvec4 stored = texelFetch(lists, ivec2(tile), 0);
@@ -127,21 +133,23 @@ void main() {
     MaskReceiver receiver_2 = fetch_receiver(pixel + 2u * step, blocked_2);
     MaskReceiver receiver_3 = fetch_receiver(pixel + 3u * step, blocked_3);
 
-    // First the list, then, where it is not complete, the hierarchy from there on.
-    uint nodes = params.counts.z;
-    bool in_parts = stored.y > TASK_ENTRIES;
-    TriangleList found = TriangleList(stored.x, min(stored.y, TASK_ENTRIES), stored.z);
-    if (push.further != 0u) {
-        found = TriangleList(task.y, min(stored.y - task.z, TASK_ENTRIES), nodes);
-    }
-    uint node = found.resume;
-    uint slot = 0u;
-    bool shaft_known = false;
+    bool in_parts = stored.y > TASK_ENTRIES || stored.z < params.counts.z;
+    TriangleList found = TriangleList(stored.x, min(stored.y, TASK_ENTRIES), 0u);
+    uint node = 0u;
+    uint end = 0u;
     Shaft shaft;
-    if (node < nodes) {
+    if (push.step == STEP_FURTHER) {
+        found = TriangleList(task.y, min(stored.y - task.z, TASK_ENTRIES), 0u);
+    } else if (push.step == STEP_WALK) {
+        // A walk can begin at any node: what is known of those above is only that they may be met.
+        found.count = 0u;
+        uint first = (push.first_run + gl_WorkGroupID.z) * push.run;
+        node = max(first, stored.z);
+        end = min(first + push.run, params.counts.z);
         shaft = fetch_shaft(tile);
     }
-    while (found.count > 0u || node < nodes) {
+    uint slot = 0u;
+    while (found.count > 0u || node < end) {
         bool listed = found.count > 0u;
         uint triangle = 0u;
         bool meets = listed;

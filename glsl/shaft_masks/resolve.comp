@@ -1,5 +1,5 @@
 #version 460
-// Visibility of the tiles whose lists were worked on in several tasks.
+// Visibility of the tiles that were worked on in several tasks.
 
 #include "common/tiles.glsl"
 #include "shaft_masks/lists.glsl"
@@ -18,6 +18,11 @@ layout(set = 0, binding = 2) uniform usampler2D tasks;
 layout(set = 0, binding = 3) uniform usampler2D lists;
 layout(set = 0, binding = 4) uniform usampler2D words;
 layout(set = 0, binding = 5, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 6) uniform usampler2D partial_list;
+
+layout(push_constant) uniform Push {
+    uint is_partial; // 1 for the tiles whose lists do not know all
+} push;
 
 vec4 fetch_triangle_texel(uint texel) {
     return vec4(0.0); // none is needed here
@@ -25,14 +30,16 @@ vec4 fetch_triangle_texel(uint texel) {
 
 void main() {
     uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
-    if (index >= arguments.count) {
+    if (index >= arguments.count || gl_WorkGroupID.z > 0u) {
         return;
     }
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
-    uvec4 task = texelFetch(tasks, task_place(index), 0);
+    uvec4 task = push.is_partial != 0u ? texelFetch(partial_list, tile_entry_place(index, tiles), 0)
+        : texelFetch(tasks, task_place(index), 0);
     uvec2 tile = tile_of_entry(task.x, tiles);
     // One task of the tile is enough.
-    if (task.z != TASK_ENTRIES || texelFetch(lists, ivec2(tile), 0).w == TILE_SETTLED) {
+    bool is_first = push.is_partial != 0u || task.z == TASK_ENTRIES;
+    if (!is_first || texelFetch(lists, ivec2(tile), 0).w == TILE_SETTLED) {
         return;
     }
     int hidden = 0;

@@ -1,17 +1,42 @@
 //! The passes that work on the lists.
 
-use super::{Lists, NAME, ShaftOptions, texels};
+use super::{Lists, NAME, ShaftOptions, Sizes, texels};
 use crate::geometry::{TILE_SIZE, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferId, Graph, ImageId, PassKind, Stage};
 use crate::shadow::{ShadowInputs, shape_number};
 use ash::vk;
+use bytemuck::{Pod, Zeroable};
+
+/// Most runs of nodes in a dispatch: what devices allow along an axis.
+pub(super) const MOST_RUNS: u32 = 65_535;
+
+/// `Push` of `shaft_masks/masks.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct Push {
+    step: u32,
+    first_run: u32,
+    run: u32,
+}
+
+/// What the tiles are worked on for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// The beginnings of their lists.
+    Tiles,
+    /// The rest of long lists.
+    Further,
+    /// Triangles that lists do not know, among the nodes from the given run on.
+    Walk(u32),
+}
 
 /// What the passes share.
 pub(super) struct Masks {
     pub options: ShaftOptions,
-    /// Chunks of a task.
-    pub task_chunks: u32,
+    pub sizes: Sizes,
+    /// Nodes of the hierarchy.
+    pub nodes: u32,
     pub params: BufferId,
     pub shafts: ImageId,
     pub lists: Lists,
@@ -30,9 +55,19 @@ impl Masks {
         let words = across * down * TILE_SIZE * TILE_SIZE * self.options.side.pow(2) / 32;
         let words = texels(vk::Format::R32_UINT, words);
         let words = graph.create_image(format!("{NAME}.words {name}"), words);
-        let (visibility, words) = self.add_pass(graph, inputs, visibility, words, false);
-        let (visibility, words) = self.add_pass(graph, inputs, visibility, words, true);
-        self.add_resolve(graph, inputs, visibility, words)
+        let mut made = (visibility, words);
+        let runs = self.nodes / self.sizes.run_nodes + 1;
+        let walks = (0..runs).step_by(MOST_RUNS as usize).map(Step::Walk);
+        for step in [Step::Tiles, Step::Further].into_iter().chain(walks) {
+            made = self.add_pass(graph, inputs, made, step);
+        }
+        let Lists {
+            further, partial, ..
+        } = self.lists;
+        for (arguments, is_partial) in [(further, false), (partial.arguments, true)] {
+            made.0 = self.add_resolve(graph, inputs, made, arguments, is_partial);
+        }
+        made.0
     }
 
     /// Specialization constants of all passes.
@@ -42,18 +77,16 @@ impl Masks {
             (1, self.options.side),
             (2, self.options.side),
             (3, u32::from(inputs.scene.has_masks())),
-            (4, self.task_chunks),
+            (4, self.sizes.task_chunks),
         ]
     }
 
-    /// Masks of the tiles, or of the further tasks.
     fn add_pass(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        visibility: ImageId,
-        words: ImageId,
-        is_further: bool,
+        (visibility, words): (ImageId, ImageId),
+        step: Step,
     ) -> (ImageId, ImageId) {
         let name = &inputs.light_name;
         let (ids, gbuffer) = (inputs.ids, inputs.gbuffer);
@@ -65,10 +98,14 @@ impl Masks {
             lists,
             further,
             tasks,
+            partial,
         } = self.lists;
-        let arguments = if is_further { further } else { tiles.arguments };
-        let step = if is_further { "further" } else { "masks" };
-        let mut pass = graph.pass(format!("{NAME}.{step} {name}"), PassKind::Compute);
+        let (arguments, list, what) = match step {
+            Step::Tiles => (tiles.arguments, tiles.tiles, "masks"),
+            Step::Further => (further, tiles.tiles, "further"),
+            Step::Walk(_) => (partial.arguments, partial.tiles, "walk"),
+        };
+        let mut pass = graph.pass(format!("{NAME}.{what} {name}"), PassKind::Compute);
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
         let images = [
@@ -80,7 +117,7 @@ impl Masks {
             pool,
             lists,
             tasks,
-            tiles.tiles,
+            list,
         ];
         for image in images.into_iter().chain(ids.mask_images()) {
             pass.read(image, Access::Sampled(Stage::Compute));
@@ -88,12 +125,23 @@ impl Masks {
         pass.read(arguments, Access::Indirect);
         pass.read(arguments, Access::Uniform(Stage::Compute));
         let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
-        let words = if is_further {
-            pass.write(words, Access::StorageReadWrite(Stage::Compute))
-        } else {
+        let words = if step == Step::Tiles {
             pass.overwrite(words, Access::StorageWrite(Stage::Compute))
+        } else {
+            pass.write(words, Access::StorageReadWrite(Stage::Compute))
         };
         let constants = self.constants(inputs);
+        let run = self.sizes.run_nodes;
+        let (step, first_run) = match step {
+            Step::Tiles => (0, 0),
+            Step::Further => (1, 0),
+            Step::Walk(first_run) => (2, first_run),
+        };
+        let push = Push {
+            step,
+            first_run,
+            run,
+        };
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -107,7 +155,7 @@ impl Masks {
                 Bind::sampled(7, ids.triangle_uvs, nearest),
                 Bind::sampled(8, ids.texels, nearest),
                 Bind::uniform(9, arguments),
-                Bind::sampled(10, tiles.tiles, nearest),
+                Bind::sampled(10, list, nearest),
                 Bind::sampled(11, shafts, nearest),
                 Bind::sampled(12, pool, nearest),
                 Bind::sampled(13, lists, nearest),
@@ -119,7 +167,6 @@ impl Masks {
                 constants,
                 ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_MASKS_COMP)
             };
-            let push = u32::from(is_further);
             ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
             ctx.dispatch_indirect(arguments, 0)
         });
@@ -130,22 +177,23 @@ impl Masks {
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        visibility: ImageId,
-        words: ImageId,
+        (visibility, words): (ImageId, ImageId),
+        arguments: BufferId,
+        is_partial: bool,
     ) -> ImageId {
         let name = &inputs.light_name;
         let params = self.params;
         let Lists {
             lists,
-            further,
             tasks,
+            partial,
             ..
         } = self.lists;
         let mut pass = graph.pass(format!("{NAME}.resolve {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
-        pass.read(further, Access::Indirect);
-        pass.read(further, Access::Uniform(Stage::Compute));
-        for image in [tasks, lists, words] {
+        pass.read(arguments, Access::Indirect);
+        pass.read(arguments, Access::Uniform(Stage::Compute));
+        for image in [tasks, lists, words, partial.tiles] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
@@ -153,20 +201,22 @@ impl Masks {
         constants.retain(|(id, _)| matches!(id, 1 | 2 | 4));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
-            let bindings = [
-                Bind::uniform(0, params),
-                Bind::uniform(1, further),
-                Bind::sampled(2, tasks, nearest),
-                Bind::sampled(3, lists, nearest),
-                Bind::sampled(4, words, nearest),
-                Bind::storage_image(5, visibility),
-            ];
             let pipeline = ComputePipelineDesc {
                 constants,
                 ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_RESOLVE_COMP)
             };
-            ctx.bind_compute(&pipeline, &bindings, &[])?;
-            ctx.dispatch_indirect(further, 0)
+            let bindings = [
+                Bind::uniform(0, params),
+                Bind::uniform(1, arguments),
+                Bind::sampled(2, tasks, nearest),
+                Bind::sampled(3, lists, nearest),
+                Bind::sampled(4, words, nearest),
+                Bind::storage_image(5, visibility),
+                Bind::sampled(6, partial.tiles, nearest),
+            ];
+            let push = u32::from(is_partial);
+            ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
+            ctx.dispatch_indirect(arguments, 0)
         });
         visibility
     }

@@ -16,7 +16,9 @@
 //! | `shafts` | their shafts |
 //! | `lists` | lit and dark tiles settled; lists of the others |
 //! | `masks` | visibility of the others, or what the beginnings of long lists hide |
-//! | `further`, `resolve` | the rest of long lists, and their tiles' visibility |
+//! | `further` | what the rest of long lists hides |
+//! | `walk` | what triangles hide that lists had no room for |
+//! | `resolve` | visibility of the tiles of the last two |
 
 mod masks;
 mod options;
@@ -78,6 +80,8 @@ struct Lists {
     further: BufferId,
     /// RGBA32_UINT: parts of long lists.
     tasks: ImageId,
+    /// Tiles whose lists do not know all triangles.
+    partial: TileList,
 }
 
 /// Sizes of what the device fills.
@@ -87,6 +91,8 @@ struct Sizes {
     pool_rows: u32,
     /// Chunks of a task: `TASK_CHUNKS` in `shaft_masks/lists.glsl`.
     task_chunks: u32,
+    /// Nodes of a task that walks the hierarchy.
+    run_nodes: u32,
 }
 
 impl Sizes {
@@ -94,14 +100,16 @@ impl Sizes {
         // A small picture's tiles are wide, and so are their shafts.
         let rows = (tiles.max(LEAST_TILES) * options.room).div_ceil(POOL_WIDTH);
         // A cut-out triangle costs a look for each sample, others a few operations a row.
-        let task_chunks = match (masked, options.side) {
-            (false, _) => 16,
-            (true, 8) => 4,
-            (true, _) => 1,
+        let (task_chunks, run_nodes) = match (masked, options.side) {
+            (false, _) => (16, 1024),
+            (true, 8) => (4, 256),
+            (true, 16) => (1, 64),
+            (true, _) => (1, 16),
         };
         Self {
             pool_rows: rows.min(MOST_POOL_ROWS),
             task_chunks,
+            run_nodes,
         }
     }
 
@@ -139,7 +147,8 @@ pub(super) fn add_passes<'f>(
     let (lists, visibility) = add_lists(graph, inputs, buffer, &receivers, shafts, sizes);
     let masks = masks::Masks {
         options,
-        task_chunks: sizes.task_chunks,
+        sizes,
+        nodes,
         params: buffer,
         shafts,
         lists,
@@ -226,15 +235,21 @@ fn add_lists(
     let [across, down] = tile_counts(size);
     let mut penumbra = TileList::create(graph, &format!("{NAME}.penumbra {name}"), size);
     let sixteen = BufferDesc { size: 16 };
+    let mut partial = TileList::create(graph, &format!("{NAME}.partial {name}"), size);
     let used = graph.create_buffer(format!("{NAME}.used {name}"), sixteen);
     let further = graph.create_buffer(format!("{NAME}.further {name}"), sixteen);
     let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
     penumbra.clear(&mut pass);
+    partial.clear(&mut pass);
     let used = pass.overwrite(used, Access::Clear);
     let further = pass.overwrite(further, Access::Clear);
     let cleared = penumbra;
+    let runs = inputs.scene.node_count() as u32 / sizes.run_nodes + 1;
+    let no_partial = [0u32, 1, runs.min(masks::MOST_RUNS), 0];
+    let partial_arguments = partial.arguments;
     pass.record(move |ctx| {
         cleared.record_clear(ctx)?;
+        ctx.update_buffer(partial_arguments, 0, bytemuck::cast_slice(&no_partial))?;
         ctx.update_buffer(used, 0, &[0; 16])?;
         ctx.update_buffer(further, 0, bytemuck::cast_slice(&[0u32, 1, 1, 0]))
     });
@@ -266,6 +281,7 @@ fn add_lists(
     }
     tiles.read(&mut pass);
     penumbra.fill(&mut pass);
+    partial.fill(&mut pass);
     let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
     let further = pass.write(further, Access::StorageReadWrite(Stage::Compute));
     let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
@@ -292,6 +308,8 @@ fn add_lists(
             Bind::sampled(14, view_depth, nearest),
             Bind::storage_buffer(15, further),
             Bind::storage_image(16, tasks),
+            Bind::storage_buffer(17, partial.arguments),
+            Bind::storage_image(18, partial.tiles),
         ];
         let shader = &spirv::SHAFT_MASKS_LISTS_COMP;
         let pipeline = ComputePipelineDesc {
@@ -308,6 +326,7 @@ fn add_lists(
         lists,
         further,
         tasks,
+        partial,
     };
     (lists, visibility)
 }

@@ -1,5 +1,6 @@
 //! `occlusion-textures` against closed forms and brute force: filters, combinations, slices and what
 //! they are allowed to be wrong by.
+#![cfg(feature = "cli")]
 
 mod support;
 

@@ -1,4 +1,5 @@
 //! `shaft-masks` against rays to the same samples of the light, and against itself with little room.
+#![cfg(feature = "cli")]
 
 mod support;
 

@@ -1,5 +1,6 @@
 //! `hard` against the exact shadow of the light's centre, cast ray by ray on the CPU, on every scene
 //! of `assets/`.
+#![cfg(feature = "cli")]
 
 mod support;
 

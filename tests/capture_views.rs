@@ -1,5 +1,6 @@
 //! Lights get the views they need: none where nothing is seen, one where that suffices, several for a
 //! lamp in a room; and the shadow is right across the seams between views.
+#![cfg(feature = "cli")]
 
 mod support;
 

@@ -1,5 +1,6 @@
 //! A host that owns the device records our frame into its own command buffer and gets what we get on
 //! a device of our own.
+#![cfg(feature = "cli")]
 
 mod support;
 

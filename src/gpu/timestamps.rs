@@ -100,6 +100,9 @@ impl Gpu {
                 slot.pools[pool],
                 query,
             );
+            // Waits for nothing and orders nothing. Mesa's software driver keeps a timestamp back until
+            // its next flush, and a dispatch is none: the scope would begin after its own work.
+            (self.device).cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default());
         }
         Ok(TimingId(Some(scope)))
     }

@@ -78,11 +78,40 @@ fn c3_level_and_slanted_receivers_are_fully_lit() {
         ];
         for buckets in [32, 64, 128] {
             let scene = scene(vec![quad("slanted", corners)], square(1.0));
-            let image = &render(&scene, &[&format!("mdi:buckets={buckets}")])[0];
+            let image = &render(&scene, &[&format!("mdi:buckets={buckets},resolution=256")])[0];
             let least = image.iter().copied().fold(1.0, f32::min);
             assert_eq!(least, 1.0, "slope {slope}, {buckets} buckets");
         }
     }
+}
+
+/// Near the origin of scene space depths and places are small, but not what a view far wider than
+/// the picture rounds them by: lit ground must not shadow itself.
+#[cfg(feature = "cli")]
+#[test]
+fn ground_near_the_origin_is_lit_by_a_sun() {
+    use antumbra::scene::LoadOptions;
+    let _one = support::serial();
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/lights.gltf");
+    let scene = Scene::load(&path, &LoadOptions::default()).unwrap();
+    let light = scene.lights.iter().position(|light| light.name == "sun");
+    let request = |technique: &str| FrameRequest {
+        camera: scene.cameras[0].clone(),
+        size: [128; 2],
+        lights: vec![light.unwrap()],
+        technique: technique.parse().unwrap(),
+    };
+    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
+    let [hard, soft] = ["hard", "mdi:rays=16"].map(|technique| {
+        let frame = renderer.render(&request(technique)).unwrap();
+        frame.lights[0].visibility.clone()
+    });
+    // No umbra of a sun reaches beyond the shadow of its centre, but by a texel at edges.
+    let dark = |(v, w): &(&f32, &f32)| **v == 1.0 && **w == 0.0;
+    let wrong = hard.iter().zip(&soft).filter(dark).count();
+    println!("{wrong} of {} pixels", hard.len());
+    assert!(wrong * 500 < hard.len(), "{wrong} pixels");
+    support::assert_no_messages(&renderer.destroy().unwrap());
 }
 
 #[test]
@@ -120,7 +149,31 @@ fn c6_frames_repeat_to_the_bit() {
         std::iter::once(floor()).chain(blockers).collect(),
         square(1.0),
     );
-    let images = render(&scene, &["mdi", "mdi", "mdi"]);
+    let images = render(&scene, &["mdi:resolution=512"; 3]);
     assert!(images[0] == images[1] && images[0] == images[2]);
     assert!(images[0].iter().any(|v| *v > 0.0 && *v < 1.0));
+}
+
+/// A dispatch's time counts in its own scope: the device's times make up most of a frame of this size.
+#[test]
+fn times_of_passes_account_for_the_frame() {
+    let _one = support::serial();
+    let bar = plate("bar", [-0.5, 0.5], [-1.0, 1.0], 5.0);
+    let scene = scene(vec![floor(), bar], square(1.0));
+    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
+    let request = FrameRequest {
+        camera: camera(),
+        size: [4 * SIZE; 2],
+        lights: vec![0],
+        technique: "mdi:resolution=512".parse().unwrap(),
+    };
+    let parts = (0..3).map(|_| {
+        let frame = renderer.render(&request).unwrap();
+        frame.passes.iter().map(|(_, ms)| ms).sum::<f64>() / frame.frame_ms
+    });
+    // Of the first frames shaders are compiled.
+    let part = parts.fold(0.0, f64::max);
+    println!("passes are {part:.3} of the frame");
+    assert!(part > 0.5 && part < 1.05, "{part}");
+    support::assert_no_messages(&renderer.destroy().unwrap());
 }

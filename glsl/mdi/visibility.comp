@@ -101,7 +101,11 @@ vec3 plane_depth(Receiver receiver, vec2 texel) {
     bool perspective = light_view.forward.w > 0.0;
     float facing = perspective ? across + receiver.normal.z : receiver.normal.z;
     float depth = perspective ? height / facing : (height - across) / facing;
-    float size = length(receiver.position) + length(at) * (perspective ? abs(depth) : 1.0);
+    // Places in the view are sums of its corner and extent, and offsets differences from its origin:
+    // what these round off stays where position and place themselves are near 0.
+    float extent = length(corner) + length(1.0 / light_view.scale.xy);
+    float size = length(receiver.position) + length(params.origin.xyz)
+        + extent * (perspective ? abs(depth) : 1.0);
     float slack = (size + abs(depth)) * DEPTH_ROUNDING / max(abs(facing), 1.0e-6);
     float steepest = abs(facing) + reach;
     float nearest = perspective ? abs(height) / steepest : depth - reach / abs(facing);

@@ -44,6 +44,10 @@ layout(set = 0, binding = 9, std140) uniform Arguments {
 layout(set = 0, binding = 10) uniform usampler2D list;
 
 const float DEPTH_ROUNDING = 1.0 / 1048576.0;
+// What heights over the receiver's plane are rounded by, as a part of the coordinates.
+const float PLANE_ROUNDING = 4.0e-6;
+// What the stored normal is rounded by, as an angle.
+const float NORMAL_ROUNDING = 1.0e-4;
 
 uvec4 fetch_edge_texel(ivec2 at) {
     return texelFetch(edges, at, 0);
@@ -105,6 +109,17 @@ float part_of_disk(float t) {
     return CUBIC != 0u ? t * t * (3.0 - 2.0 * t) : disk_above(2.0 * t - 1.0);
 }
 
+// Whether any of an edge is above the receiver's tangent plane, where the light that counts is: a
+// floor's own border hides nothing from the floor.
+bool over_receiver(Place here, vec3 first, vec3 second) {
+    vec3 a = first - here.p;
+    vec3 b = second - here.p;
+    vec3 largest = max(abs(here.p), max(abs(first), abs(second)));
+    float slack = PLANE_ROUNDING * (largest.x + largest.y + largest.z);
+    return dot(here.n, a) > slack + NORMAL_ROUNDING * length(a)
+        || dot(here.n, b) > slack + NORMAL_ROUNDING * length(b);
+}
+
 // What an edge does to the receiver; none where it is not in front of it.
 Seen look_at(Place here, LightView light_view, uint number) {
     Seen found = no_edge();
@@ -145,7 +160,7 @@ Seen look_at(Place here, LightView light_view, uint number) {
     found.delta = dot(here.at - found.nearest, found.outward);
     found.width = penumbra_half_width(params.reach.x, perspective, found.depth, here.depth, found.nearest);
     float apart = perspective ? found.depth - here.depth : here.depth - found.depth;
-    if (apart <= 1.0e-5 * abs(here.depth)) {
+    if (apart <= 1.0e-5 * abs(here.depth) || !over_receiver(here, first, second)) {
         return found;
     }
     found.number = number;

@@ -5,7 +5,7 @@
 
 layout(local_size_x = 64) in;
 
-layout(constant_id = 2) const uint PACKED = 1u;
+layout(constant_id = 2) const uint LAYERS = 1u; // of the tables for a group
 
 layout(set = 0, binding = 0, std140) uniform GroupBlock {
     SliceGroups groups;
@@ -16,11 +16,11 @@ void main() {
     int side = imageSize(tables).x;
     int column = int(gl_GlobalInvocationID.x);
     uint layer = gl_GlobalInvocationID.y;
-    uint layers = groups.count.x * (PACKED != 0u ? 1u : 2u);
+    uint layers = groups.count.x * LAYERS;
     if (column >= side || layer >= layers) {
         return;
     }
-    // Packed sums add up as one number: what the lower half carries over, differences of boxes take
+    // Packed sums, if they are, add up as one number: what the lower half carries over, differences of boxes take
     // back.
     uint sum = 0u;
     imageStore(tables, ivec3(column, 0, int(layer)), uvec4(0u));

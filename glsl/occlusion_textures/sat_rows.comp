@@ -1,7 +1,10 @@
 #version 460
 // Sums along rows of what each group blocks (or adds to what nearer ones block), and of what it
-// blocks together with all groups nearer to the light: the first half of their summed-area tables (Crow 1984). Whole numbers throughout,
-// so sums of boxes are exact even where they wrap.
+// blocks together with all groups nearer to the light: the first half of their summed-area tables
+// (Crow 1984). Whole numbers throughout, so sums of boxes are exact even where they wrap.
+//
+// What a group adds is what all up to it block less what all before it block, so that the second sums
+// alone are enough where a word cannot hold both.
 
 #include "occlusion_textures/groups.glsl"
 
@@ -23,6 +26,8 @@ const uint BATCH = 4u;
 void store(ivec2 place, uint group, uint own, uint all_nearer) {
     if (PACKED != 0u) {
         imageStore(tables, ivec3(place, int(group)), uvec4(own + (all_nearer << 16)));
+    } else if (ADDED != 0u) {
+        imageStore(tables, ivec3(place, int(group)), uvec4(all_nearer));
     } else {
         imageStore(tables, ivec3(place, int(2u * group)), uvec4(own));
         imageStore(tables, ivec3(place, int(2u * group + 1u)), uvec4(all_nearer));

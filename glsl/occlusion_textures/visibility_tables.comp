@@ -32,6 +32,11 @@ vec2 blocked(uint group, Kernel kernel) {
     if (PACKED != 0u) {
         return sums_over(group, kernel);
     }
+    if (COMBINE == COMBINE_CUMULATIVE) {
+        float all_nearer = sums_over(group, kernel).x;
+        float before = group > 0u ? sums_over(group - 1u, kernel).x : 0.0;
+        return vec2(max(all_nearer - before, 0.0), all_nearer);
+    }
     float own = sums_over(2u * group, kernel).x;
     return vec2(own, COMBINE >= COMBINE_CUMULATIVE ? sums_over(2u * group + 1u, kernel).x : own);
 }

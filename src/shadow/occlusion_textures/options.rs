@@ -84,8 +84,8 @@ pub struct OcclusionOptions {
     pub projection: Projection,
     /// What the slices are spent on.
     pub fit: Fit,
-    /// Texels across the slices' image, 64 to 4096, a power of two.
-    pub resolution: u32,
+    /// Texels across the slices' image, 64 to 4096, a power of two; `None`: by the picture's size.
+    pub resolution: Option<u32>,
     /// Texels of it across one of the filtered textures, 1, 2 or 4; `None`: by the size of kernels.
     pub detail: Option<u32>,
     /// A texture lies in the middle of its slices, not in their lowest plane.
@@ -105,7 +105,7 @@ impl OcclusionOptions {
         planes: Planes::Blend,
         projection: Projection::Centered,
         fit: Fit::Occupied,
-        resolution: 2048,
+        resolution: None,
         detail: None,
         middle: true,
         contact: 8,
@@ -148,8 +148,8 @@ impl OcclusionOptions {
         ),
         option(
             "resolution",
-            "2048",
-            "64 to 4096, a power of two",
+            "auto",
+            "64 to 4096, a power of two, or auto (twice the picture's longer side, 512 to 2048)",
             "texels across the slices",
         ),
         option(
@@ -215,7 +215,8 @@ impl OcclusionOptions {
             planes.to_string(),
             projection.to_string(),
             fit.to_string(),
-            self.resolution.to_string(),
+            self.resolution
+                .map_or("auto".to_string(), |texels| texels.to_string()),
             self.detail
                 .map_or("auto".to_string(), |texels| texels.to_string()),
             if self.middle { "middle" } else { "lower" }.to_string(),
@@ -279,7 +280,10 @@ impl OcclusionOptions {
                     _ => return None,
                 }
             }
-            "resolution" => self.resolution = number(64..=4096).filter(|n| n.is_power_of_two())?,
+            "resolution" if value == "auto" => self.resolution = None,
+            "resolution" => {
+                self.resolution = Some(number(64..=4096).filter(|n| n.is_power_of_two())?);
+            }
             "detail" if value == "auto" => self.detail = None,
             "detail" => self.detail = Some(number(1..=4).filter(|n| n.is_power_of_two())?),
             "depth" => {
@@ -308,6 +312,14 @@ impl OcclusionOptions {
             Fit::Range => self.slices,
             Fit::Occupied => (4 * self.slices).next_multiple_of(32).min(128),
         }
+    }
+
+    /// Texels across the slices' image for a picture of this size in pixels: a few for each pixel's
+    /// footprint where the light looks as the camera does, no more than memory and time are good for.
+    pub(super) fn texels(&self, picture: [u32; 2]) -> u32 {
+        let longer = picture[0].max(picture[1]);
+        let fitting = (2 * longer.min(1024)).next_power_of_two().clamp(512, 2048);
+        self.resolution.unwrap_or(fitting)
     }
 
     /// Texels of the bits across one of the filtered textures, for a view whose largest kernel covers

@@ -40,12 +40,18 @@ fn add_tables(
     slices: &Slices,
 ) -> Filtered {
     let detail = options.texels_filtered(slices.most_kernel);
-    let side = options.resolution / detail;
+    let side = slices.side / detail;
     // Boxes count texels of the bits; half a texel more on each side is for their borders.
-    let bits = f64::from(options.resolution);
+    let bits = f64::from(slices.side);
     let most = (slices.most_kernel.sqrt() * bits + 4.0 * f64::from(detail)).powi(2);
     let packed = most < 65_536.0;
-    let layers = options.slices * if packed { 1 } else { 2 };
+    // What a group adds is a difference of running sums; other rules need its own sum too.
+    let layers_each = if packed || options.combine == Combine::Cumulative {
+        1
+    } else {
+        2
+    };
+    let layers = options.slices * layers_each;
     let desc = ImageDesc::new(vk::Format::R32_UINT, side + 1, side + 1).layers(layers);
     let tables = graph.create_image(format!("{NAME}.tables {name}"), desc);
     let constants = vec![
@@ -86,7 +92,7 @@ fn add_tables(
             Bind::storage_image(1, tables).array(),
         ];
         let pipeline = ComputePipelineDesc {
-            constants: vec![(2, u32::from(packed))],
+            constants: vec![(2, layers_each)],
             ..ComputePipelineDesc::new(shader)
         };
         ctx.bind_compute(&pipeline, &bindings, &[])?;
@@ -115,7 +121,7 @@ fn add_averages(
     slices: &Slices,
 ) -> Filtered {
     let detail = options.texels_filtered(slices.most_kernel);
-    let side = options.resolution / detail;
+    let side = slices.side / detail;
     let mipmaps = options.filter == Filter::Mipmaps;
     let layers = options.slices;
     let desc = ImageDesc::new(vk::Format::R16G16B16A16_SFLOAT, side, side);

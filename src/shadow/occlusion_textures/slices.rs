@@ -39,6 +39,8 @@ pub(super) struct Slices {
     pub groups: BufferId,
     /// Depths of the planes between fine slices: a uniform buffer.
     pub planes: BufferId,
+    /// Texels of the bits across.
+    pub side: u32,
     /// The largest kernel's part of the image's area, 0 to 1.
     pub most_kernel: f64,
 }
@@ -73,7 +75,7 @@ pub(super) fn add_slices<'f>(
 ) -> Slices {
     let name = format!("{}.{index}", inputs.light_name);
     let (params, planes) = add_params(graph, &name, view);
-    let side = options.resolution;
+    let side = options.texels(inputs.camera.size());
     let fine = options.fine_slices();
     let joined = inputs.scene.features().logic_op;
     let words = if joined { options.words() } else { MOST_WORDS };
@@ -91,13 +93,14 @@ pub(super) fn add_slices<'f>(
         add_packed_marks(graph, inputs, &drawing, bits)
     };
     let any = add_pyramid(graph, &name, bits, side, words);
-    let groups = add_groups(graph, &name, options, view, any, planes);
+    let groups = add_groups(graph, &name, options, (view, side), any, planes);
     Slices {
         params,
         bits,
         any,
         groups,
         planes,
+        side,
         most_kernel: view.most_kernel,
     }
 }
@@ -304,7 +307,7 @@ fn add_groups(
     graph: &mut Graph<'_>,
     name: &str,
     options: &OcclusionOptions,
-    view: &SlicedView,
+    (view, side): (&SlicedView, u32),
     any: ImageId,
     planes: BufferId,
 ) -> BufferId {
@@ -314,7 +317,7 @@ fn add_groups(
     // for the image.
     let counts = ImageDesc::new(vk::Format::R32_UINT, 4, 1);
     let counts = graph.create_image(format!("{NAME}.counts {name}"), counts);
-    let side = (options.resolution / ANY_BASE).max(1);
+    let side = (side / ANY_BASE).max(1);
     let last = ImagePart::mip(ImageDesc::new(vk::Format::R32_UINT, side, side).max_mips() - 1);
     let mut pass = graph.pass(format!("{NAME}.groups {name}"), PassKind::Compute);
     pass.read_part(any, last, Access::Sampled(Stage::Compute));

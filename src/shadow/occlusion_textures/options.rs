@@ -149,7 +149,7 @@ impl OcclusionOptions {
         option(
             "resolution",
             "auto",
-            "64 to 4096, a power of two, or auto (twice the picture's longer side, 512 to 2048)",
+            "64 to 4096, a power of two, or auto (8 times the picture's longer side, 512 to 2048)",
             "texels across the slices",
         ),
         option(
@@ -314,11 +314,11 @@ impl OcclusionOptions {
         }
     }
 
-    /// Texels across the slices' image for a picture of this size in pixels: a few for each pixel's
+    /// Texels across the slices' image for a picture of this size in pixels: several for each pixel's
     /// footprint where the light looks as the camera does, no more than memory and time are good for.
     pub(super) fn texels(&self, picture: [u32; 2]) -> u32 {
         let longer = picture[0].max(picture[1]);
-        let fitting = (2 * longer.min(1024)).next_power_of_two().clamp(512, 2048);
+        let fitting = (8 * longer.min(256)).next_power_of_two().clamp(512, 2048);
         self.resolution.unwrap_or(fitting)
     }
 

@@ -154,7 +154,8 @@ fn c6_frames_repeat_to_the_bit() {
     assert!(images[0].iter().any(|v| *v > 0.0 && *v < 1.0));
 }
 
-/// A dispatch's time counts in its own scope: the device's times make up most of a frame of this size.
+/// A dispatch's time counts in its own scope: the device's times make up most of a frame whose work
+/// is nearly all in dispatches.
 #[test]
 fn times_of_passes_account_for_the_frame() {
     let _one = support::serial();
@@ -167,12 +168,21 @@ fn times_of_passes_account_for_the_frame() {
         lights: vec![0],
         technique: "mdi:resolution=512".parse().unwrap(),
     };
-    let parts = (0..3).map(|_| {
-        let frame = renderer.render(&request).unwrap();
-        frame.passes.iter().map(|(_, ms)| ms).sum::<f64>() / frame.frame_ms
-    });
-    // Of the first frames shaders are compiled.
-    let part = parts.fold(0.0, f64::max);
+    let frames: Vec<_> = (0..3).map(|_| renderer.render(&request).unwrap()).collect();
+    let sum = |passes: &[(String, f64)]| passes.iter().map(|(_, ms)| ms).sum::<f64>();
+    for frame in &frames {
+        println!(
+            "{:.1} of {:.1} ms: {:?}",
+            sum(&frame.passes),
+            frame.frame_ms,
+            frame.passes
+        );
+    }
+    // Of the first frame shaders are compiled; times are of the frame before on some devices.
+    let parts = frames[1..]
+        .iter()
+        .map(|frame| sum(&frame.passes) / frame.frame_ms);
+    let part = parts.fold(f64::INFINITY, f64::min);
     println!("passes are {part:.3} of the frame");
     assert!(part > 0.5 && part < 1.05, "{part}");
     support::assert_no_messages(&renderer.destroy().unwrap());

@@ -275,3 +275,31 @@ fn a_light_of_no_size_is_hard_and_nothing_is_full_light() {
     let covered = render(&under(&[(5.0, [-9.0, 9.0], [-9.0, 9.0])], DISK), &["ssoc"]);
     assert!(covered[0].iter().all(|v| *v == 0.0));
 }
+
+/// A floor's own border is a silhouette, and hides nothing from the floor.
+#[cfg(feature = "cli")]
+#[test]
+fn a_floor_is_not_darkened_by_its_border() {
+    use antumbra::scene::LoadOptions;
+    let _one = support::serial();
+    let path =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/sphere_over_plane.gltf");
+    let scene = Scene::load(&path, &LoadOptions::default()).unwrap();
+    let request = |technique: &str| FrameRequest {
+        camera: scene.cameras[0].clone(),
+        size: [256; 2],
+        lights: vec![0],
+        technique: technique.parse().unwrap(),
+    };
+    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
+    let [hard, soft] = ["hard", "ssoc"].map(|technique| {
+        let frame = renderer.render(&request(technique)).unwrap();
+        frame.lights[0].visibility.clone()
+    });
+    // Where a ball leaves the light's centre in sight, it leaves half of the light.
+    let dark = |(v, w): &(&f32, &f32)| **v == 1.0 && **w < 0.4;
+    let wrong = hard.iter().zip(&soft).filter(dark).count();
+    println!("{wrong} of {} pixels", hard.len());
+    assert!(wrong * 500 < hard.len(), "{wrong} pixels");
+    support::assert_no_messages(&renderer.destroy().unwrap());
+}

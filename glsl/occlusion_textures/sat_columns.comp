@@ -20,8 +20,8 @@ void main() {
     if (column >= side || layer >= layers) {
         return;
     }
-    // Packed sums, if they are, add up as one number: what the lower half carries over, differences of boxes take
-    // back.
+    // Where a word holds two sums, they add up as one number: what the lower one carries over,
+    // differences of boxes take back.
     uint sum = 0u;
     imageStore(tables, ivec3(column, 0, int(layer)), uvec4(0u));
     for (int y = 1; y < side; ++y) {

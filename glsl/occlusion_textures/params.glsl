@@ -23,6 +23,8 @@ struct OcclusionView {
                   // is uniform in 1/z
     vec4 half_x;  // halves of the light along right, up and forward, metres; of a sun tangents
     vec4 half_y;  // the same of its other axis
+    vec4 border;  // xy: lowest, zw: highest map coordinates that are known: 0, 1; far out on sides
+                  // beyond which there is nothing
 };
 
 // 1 over what image coordinates are divided by at depth z.

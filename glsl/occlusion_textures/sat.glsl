@@ -3,45 +3,75 @@
 #ifndef ANTUMBRA_OCCLUSION_TEXTURES_SAT_GLSL
 #define ANTUMBRA_OCCLUSION_TEXTURES_SAT_GLSL
 
-// Entries (i.x, i.y), (i.x + 1, i.y), (i.x + 1, i.y + 1), (i.x, i.y + 1) of a table in w, z, y, x.
-uvec4 gather_table(uint layer, vec2 i);
+#include "occlusion_textures/tables.glsl"
 
-// Sum over a box of what the two halves of a table's words count; low and high in texels, 0 to side.
-// PACKED_SUMS: x: lower half, y: upper half; else all of the word in x.
-vec2 box_sums(uint layer, vec2 low, vec2 high, float side, bool packed_sums) {
+// Where in a texel two groups' sums are.
+struct Sums {
+    uvec2 component;
+    uvec2 shift;
+    uint mask;
+};
+
+// Of two groups of a layer, by their numbers in it.
+Sums sums_of(uvec2 group, bool packed_sums) {
+    return packed_sums
+        ? Sums((group & 1u) + (group >> 2) * 2u, (group >> 1 & 1u) * 16u, 0xffffu)
+        : Sums(group, uvec2(0u), 0xffffffffu);
+}
+
+uvec2 pick(uvec4 texel, uvec2 component) {
+    return uvec2(texel[component.x], texel[component.y]);
+}
+
+// Differences of a row of a table: x of the whole columns of a box, y of the column after them, z of
+// its first column.
+struct Row {
+    uvec2 whole;
+    uvec2 more;
+    uvec2 less;
+};
+
+Row table_row(usampler2DArray tables, ivec2 first, int last, int layer, Sums sums) {
+    uvec2 left = pick(texelFetch(tables, ivec3(first, layer), 0), sums.component);
+    uvec2 left_next = pick(texelFetch(tables, ivec3(first.x + 1, first.y, layer), 0), sums.component);
+    uvec2 right = pick(texelFetch(tables, ivec3(last, first.y, layer), 0), sums.component);
+    uvec2 right_next = pick(texelFetch(tables, ivec3(last + 1, first.y, layer), 0), sums.component);
+    return Row(right - left, right_next - right, left_next - left);
+}
+
+// The difference of two rows, with fractions of the columns at its ends. What fractions take away
+// again leaves rounding behind, so the most that it can be off by is there too.
+vec2 row_sum(Row a, Row b, vec2 fractions, Sums sums, out vec2 most) {
+    vec2 whole = vec2((b.whole - a.whole) >> sums.shift & sums.mask);
+    vec2 more = vec2((b.more - a.more) >> sums.shift & sums.mask);
+    vec2 less = vec2((b.less - a.less) >> sums.shift & sums.mask);
+    most = whole + more;
+    return whole + more * fractions.y - less * fractions.x;
+}
+
+// Sums of two groups of a layer over a box; low and high in texels, 0 to side.
+vec2 box_sums(usampler2DArray tables, int layer, Sums sums, vec2 low, vec2 high, float side) {
     vec2 first = min(floor(low), side - 1.0);
     vec2 last = min(floor(high), side - 1.0);
     vec2 before = low - first;
     vec2 beyond = high - last;
-    uvec4 a = gather_table(layer, first);
-    uvec4 b = gather_table(layer, vec2(last.x, first.y));
-    uvec4 c = gather_table(layer, vec2(first.x, last.y));
-    uvec4 d = gather_table(layer, last);
-    // Columns at first.x, first.x + 1, last.x, last.x + 1; rows first.y, + 1, last.y, + 1.
-    uvec4 left = uvec4(a.w, a.x, c.w, c.x);
-    uvec4 left_next = uvec4(a.z, a.y, c.z, c.y);
-    uvec4 right = uvec4(b.w, b.x, d.w, d.x);
-    uvec4 right_next = uvec4(b.z, b.y, d.z, d.y);
-    uvec4 whole = right - left;
-    uvec4 more = right_next - right;
-    uvec4 less = left_next - left;
-    uvec3 whole_box = uvec3(whole.z - whole.x, whole.w - whole.z, whole.y - whole.x);
-    uvec3 more_box = uvec3(more.z - more.x, more.w - more.z, more.y - more.x);
-    uvec3 less_box = uvec3(less.z - less.x, less.w - less.z, less.y - less.x);
-    vec3 rows = vec3(1.0, beyond.y, -before.y);
-    if (packed_sums) {
-        vec3 low_sums = vec3(dot(vec3(whole_box & 0xffffu), rows), dot(vec3(more_box & 0xffffu), rows),
-            dot(vec3(less_box & 0xffffu), rows));
-        vec3 high_sums = vec3(dot(vec3(whole_box >> 16), rows), dot(vec3(more_box >> 16), rows),
-            dot(vec3(less_box >> 16), rows));
-        vec3 columns = vec3(1.0, beyond.x, -before.x);
-        return vec2(dot(low_sums, columns), dot(high_sums, columns));
-    }
-    vec3 sums = vec3(dot(vec3(whole_box), rows), dot(vec3(more_box), rows), dot(vec3(less_box), rows));
-    // Fractions that cancel leave rounding behind, which must not darken what nothing blocks.
-    float sum = dot(sums, vec3(1.0, beyond.x, -before.x));
-    float most = float(whole_box.x) + float(more_box.x) + float(less_box.x);
-    return vec2(sum > 2.0e-6 * most ? sum : 0.0, 0.0);
+    ivec2 from = ivec2(first);
+    ivec2 to = ivec2(last);
+    Row top = table_row(tables, from, to.x, layer, sums);
+    Row top_next = table_row(tables, ivec2(from.x, from.y + 1), to.x, layer, sums);
+    Row bottom = table_row(tables, ivec2(from.x, to.y), to.x, layer, sums);
+    Row bottom_next = table_row(tables, ivec2(from.x, to.y + 1), to.x, layer, sums);
+    vec2 columns = vec2(before.x, beyond.x);
+    vec2 most;
+    vec2 most_more;
+    vec2 most_less;
+    vec2 sum = row_sum(top, bottom, columns, sums, most);
+    vec2 more = row_sum(bottom, bottom_next, columns, sums, most_more);
+    vec2 less = row_sum(top, top_next, columns, sums, most_less);
+    sum += more * beyond.y - less * before.y;
+    // Rounding must not darken what nothing blocks.
+    most += most_more;
+    return mix(vec2(0.0), sum, greaterThan(sum, 2.0e-6 * most));
 }
 
 #endif

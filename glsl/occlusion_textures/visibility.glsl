@@ -59,7 +59,7 @@ layout(set = 0, binding = 11, std140) uniform PlaneBlock {
 struct Kernel {
     vec2 middle;
     vec2 halves; // as seen; a box for a filter is at least a texel wide
-    vec2 low;
+    vec2 low;    // of the box, cut to what is known
     vec2 high;
 };
 
@@ -79,7 +79,10 @@ Kernel kernel_at(Receiver at, float plane, float inverse) {
         * slice_view.scale.xy * at.side;
     vec2 halves = at.halves * abs(slice_view.scale.xy) * (wide * inverse * at.side);
     vec2 box = max(halves, vec2(0.5));
-    return Kernel(middle, halves, middle - box, middle + box);
+    vec2 known_low = slice_view.border.xy * at.side;
+    vec2 known_high = slice_view.border.zw * at.side;
+    return Kernel(middle, halves, clamp(middle - box, known_low, known_high - 1.0),
+        clamp(middle + box, known_low + 1.0, known_high));
 }
 
 // Fine slices with anything in a box of texels, and in those beside it.
@@ -136,7 +139,7 @@ float own_depth(Receiver at, vec2 u) {
 float own_nearest(Receiver at, Kernel kernel) {
     vec2 corner = vec2(slice_view.right.w, slice_view.up.w);
     vec2 texel = 1.0 / (slice_view.scale.xy * at.side);
-    vec2 u = 0.5 * (kernel.low + kernel.high) * texel + corner;
+    vec2 u = kernel.middle * texel + corner;
     float own = own_depth(at, u);
     float apart = abs(own_depth(at, u + vec2(texel.x, 0.0)) - own)
         + abs(own_depth(at, u + vec2(0.0, texel.y)) - own);
@@ -247,6 +250,9 @@ float through_slices(Receiver at) {
             product = min(product, 1.0 - fade * mean.x);
         } else {
             product *= 1.0 - fade * mean.x;
+        }
+        if (product <= 0.0) {
+            break;
         }
     }
     float seen = clamp(min(product, least), 0.0, 1.0);

@@ -4,43 +4,48 @@
 #include "occlusion_textures/visibility.glsl"
 #include "occlusion_textures/sat.glsl"
 
-layout(constant_id = 2) const uint PACKED = 1u; // both sums of a group in one word
+layout(constant_id = 2) const uint PACKED = 1u; // two sums in a component
+layout(constant_id = 3) const uint LAYERS = 1u; // of a set of tables: the second set of COMBINE_BOUNDED
+                                                // holds what all groups up to one block
 
 layout(set = 0, binding = 5) uniform usampler2DArray tables;
-
-uvec4 gather_table(uint layer, vec2 i) {
-    float side = float(textureSize(tables, 0).x);
-    return textureGather(tables, vec3((i + 1.0) / side, float(layer)));
-}
 
 float texture_side() {
     return float(textureSize(tables, 0).x - 1);
 }
 
-// Sums over the part of a kernel that is in the image; outside is nothing.
-vec2 sums_over(uint layer, Kernel kernel) {
+// Means of two groups of a layer over a kernel, of which the part outside of the image is empty.
+vec2 means_over(uint table, uvec2 group, Kernel kernel) {
     float side = texture_side();
     vec2 size = (kernel.high - kernel.low) * DETAIL;
-    vec2 sums = box_sums(layer, clamp(kernel.low, 0.0, side), clamp(kernel.high, 0.0, side), side,
-        PACKED != 0u);
+    Sums sums = sums_of(group, PACKED != 0u);
+    vec2 blocked_texels = box_sums(tables, int(table), sums, clamp(kernel.low, 0.0, side),
+        clamp(kernel.high, 0.0, side), side);
+    fetched += 16.0;
     // What is all blocked must not let rounding through.
-    fetched += 4.0;
-    return clamp(sums * (1.0 + 4.0e-6) / (size.x * size.y), 0.0, 1.0);
+    return clamp(blocked_texels * (1.0 + 4.0e-6) / (size.x * size.y), 0.0, 1.0);
+}
+
+const uint EACH = PACKED != 0u ? GROUPS_A_PACKED_TEXEL : GROUPS_A_TEXEL;
+
+float mean_over(uint set_layer, uint group, Kernel kernel) {
+    return means_over(set_layer + group / EACH, uvec2(group % EACH), kernel).x;
 }
 
 vec2 blocked(uint group, Kernel kernel) {
-    if (PACKED != 0u) {
-        return sums_over(group, kernel);
-    }
     if (COMBINE == COMBINE_CUMULATIVE) {
-        float all_nearer = sums_over(group, kernel).x;
-        float before = group > 0u ? sums_over(group - 1u, kernel).x : 0.0;
-        return vec2(max(all_nearer - before, 0.0), all_nearer);
+        // What it adds is the difference of what it and those before it block together.
+        uint within = group % EACH;
+        vec2 means = means_over(group / EACH, uvec2(max(within, 1u) - 1u, within), kernel);
+        if (within == 0u) {
+            means.x = group > 0u ? mean_over(0u, group - 1u, kernel) : 0.0;
+        }
+        return vec2(max(means.y - means.x, 0.0), means.y);
     }
-    float own = sums_over(2u * group, kernel).x;
-    return vec2(own, COMBINE >= COMBINE_CUMULATIVE ? sums_over(2u * group + 1u, kernel).x : own);
+    float own = mean_over(0u, group, kernel);
+    return vec2(own, COMBINE == COMBINE_BOUNDED ? mean_over(LAYERS, group, kernel) : own);
 }
 
 float blocked_before(uint group, Kernel kernel) {
-    return PACKED != 0u ? sums_over(group - 1u, kernel).y : sums_over(2u * group - 1u, kernel).x;
+    return mean_over(LAYERS, group - 1u, kernel);
 }

@@ -18,7 +18,8 @@
 //! | `pack` | bits of them |
 //! | `any` | a pyramid of what slices hold anything in a square of texels |
 //! | `groups` | the occlusion textures: runs of occupied slices |
-//! | `rows`, `columns` | their summed-area tables |
+//! | `cells` | how much of each square of texels they block |
+//! | `rows`, `columns` | summed-area tables of that |
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
 

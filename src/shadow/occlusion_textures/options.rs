@@ -86,7 +86,7 @@ pub struct OcclusionOptions {
     pub fit: Fit,
     /// Texels across the slices' image, 64 to 4096, a power of two; `None`: by the picture's size.
     pub resolution: Option<u32>,
-    /// Texels of it across one of the filtered textures, 1, 2 or 4; `None`: by the size of kernels.
+    /// Texels of it across one of the filtered textures, 1, 2, 4 or 8; `None`: by the size of kernels.
     pub detail: Option<u32>,
     /// A texture lies in the middle of its slices, not in their lowest plane.
     pub middle: bool,
@@ -155,7 +155,7 @@ impl OcclusionOptions {
         option(
             "detail",
             "auto",
-            "1, 2, 4 or auto (4, but 2 under kernels below an eighth of the view)",
+            "1, 2, 4, 8 or auto (4, but 2 under kernels below an eighth of the view)",
             "texels of the slices across one of the filtered textures",
         ),
         option(
@@ -285,7 +285,7 @@ impl OcclusionOptions {
                 self.resolution = Some(number(64..=4096).filter(|n| n.is_power_of_two())?);
             }
             "detail" if value == "auto" => self.detail = None,
-            "detail" => self.detail = Some(number(1..=4).filter(|n| n.is_power_of_two())?),
+            "detail" => self.detail = Some(number(1..=8).filter(|n| n.is_power_of_two())?),
             "depth" => {
                 self.middle = match value {
                     "middle" => true,

@@ -11,13 +11,22 @@ use bytemuck::{Pod, Zeroable};
 /// A view's filtered textures.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Filtered {
-    /// Tables: R32_UINT, one texel larger than a texture. Other filters: averages.
+    /// Tables: R32G32B32A32_UINT, one texel larger than a texture. Other filters: averages.
     pub image: ImageId,
-    /// Whether a table's word holds two sums of 16 bits.
+    /// Whether a component of a table holds two sums of 16 bits.
     pub packed: bool,
-    /// Levels of averages.
+    /// Layers of a set of tables, or levels of averages.
     pub levels: u32,
 }
+
+/// Groups that a texel of the cells counts: `GROUPS_A_CELL` in `tables.glsl`.
+const GROUPS_A_CELL: u32 = 16;
+/// Groups that an invocation of `cells.comp` counts.
+const GROUPS_A_BATCH: u32 = 32;
+/// Groups of a table's texel.
+const GROUPS_A_TEXEL: u32 = 4;
+/// The same with two sums in a component.
+const GROUPS_A_PACKED_TEXEL: u32 = 8;
 
 pub(super) fn add_prefilter<'f>(
     graph: &mut Graph<'f>,
@@ -33,6 +42,24 @@ pub(super) fn add_prefilter<'f>(
     }
 }
 
+/// What is counted of each group: one set of tables for each.
+fn counted(combine: Combine) -> &'static [Counted] {
+    match combine {
+        // What a group adds is a difference of running sums.
+        Combine::Cumulative => &[Counted::Nearer],
+        Combine::Bounded => &[Counted::Own, Counted::Nearer],
+        _ => &[Counted::Own],
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Counted {
+    /// What the group itself blocks.
+    Own,
+    /// What it and all groups nearer to the light block.
+    Nearer,
+}
+
 fn add_tables(
     graph: &mut Graph<'_>,
     name: &str,
@@ -45,41 +72,37 @@ fn add_tables(
     let bits = f64::from(slices.side);
     let most = (slices.most_kernel.sqrt() * bits + 4.0 * f64::from(detail)).powi(2);
     let packed = most < 65_536.0;
-    // What a group adds is a difference of running sums; other rules need its own sum too.
-    let layers_each = if packed || options.combine == Combine::Cumulative {
-        1
+    let each = if packed {
+        GROUPS_A_PACKED_TEXEL
     } else {
-        2
+        GROUPS_A_TEXEL
     };
-    let layers = options.slices * layers_each;
-    let desc = ImageDesc::new(vk::Format::R32_UINT, side + 1, side + 1).layers(layers);
-    let tables = graph.create_image(format!("{NAME}.tables {name}"), desc);
-    let constants = vec![
-        (0, options.words()),
-        (1, detail),
-        (2, u32::from(packed)),
-        (3, u32::from(options.combine == Combine::Cumulative)),
-    ];
-    let (bits, groups) = (slices.bits, slices.groups);
-    let most_groups = options.slices;
+    let sets = counted(options.combine);
+    let groups = slices.groups;
+    let cell_layers = options.slices.next_multiple_of(GROUPS_A_BATCH) / GROUPS_A_CELL;
+    let cells = add_cells(graph, name, options, slices, cell_layers);
+
+    let layers = options.slices.div_ceil(each);
+    let all_layers = layers * sets.len() as u32;
+    let desc = ImageDesc::new(vk::Format::R32G32B32A32_UINT, side + 1, side + 1);
+    let tables = graph.create_image(format!("{NAME}.tables {name}"), desc.layers(all_layers));
     let mut pass = graph.pass(format!("{NAME}.rows {name}"), PassKind::Compute);
-    pass.read(bits, Access::Sampled(Stage::Compute));
+    pass.read(cells, Access::Sampled(Stage::Compute));
     pass.read(groups, Access::Uniform(Stage::Compute));
     let tables = pass.overwrite(tables, Access::StorageWrite(Stage::Compute));
-    let row_constants = constants.clone();
     pass.record(move |ctx| {
         let shader = &spirv::OCCLUSION_TEXTURES_SAT_ROWS_COMP;
         let bindings = [
-            Bind::sampled(0, bits, SamplerDesc::nearest()),
+            Bind::sampled(0, cells, SamplerDesc::nearest()).array(),
             Bind::uniform(1, groups),
             Bind::storage_image(2, tables).array(),
         ];
         let pipeline = ComputePipelineDesc {
-            constants: row_constants,
+            constants: vec![(0, u32::from(packed)), (1, layers), (2, cell_layers)],
             ..ComputePipelineDesc::new(shader)
         };
         ctx.bind_compute(&pipeline, &bindings, &[])?;
-        ctx.dispatch(shader.groups([side, most_groups.div_ceil(4), 1]));
+        ctx.dispatch(shader.groups([side, all_layers, 1]));
         Ok(())
     });
     let mut pass = graph.pass(format!("{NAME}.columns {name}"), PassKind::Compute);
@@ -92,18 +115,67 @@ fn add_tables(
             Bind::storage_image(1, tables).array(),
         ];
         let pipeline = ComputePipelineDesc {
-            constants: vec![(2, layers_each)],
+            constants: vec![(0, u32::from(packed)), (1, layers)],
             ..ComputePipelineDesc::new(shader)
         };
         ctx.bind_compute(&pipeline, &bindings, &[])?;
-        ctx.dispatch(shader.groups([side + 1, layers, 1]));
+        ctx.dispatch(shader.groups([side + 1, all_layers, 1]));
         Ok(())
     });
     Filtered {
         image: tables,
         packed,
-        levels: 0,
+        levels: layers,
     }
+}
+
+/// Declares the passes that count bits in squares of texels.
+fn add_cells(
+    graph: &mut Graph<'_>,
+    name: &str,
+    options: &OcclusionOptions,
+    slices: &Slices,
+    layers: u32,
+) -> ImageId {
+    let detail = options.texels_filtered(slices.most_kernel);
+    let side = slices.side / detail;
+    let sets = counted(options.combine);
+    let desc = ImageDesc::new(vk::Format::R32G32B32A32_UINT, side, side);
+    let desc = desc.layers(layers * sets.len() as u32);
+    let mut cells = graph.create_image(format!("{NAME}.cells {name}"), desc);
+    let (bits, groups) = (slices.bits, slices.groups);
+    let words = options.words();
+    let batches = options.slices.div_ceil(GROUPS_A_BATCH);
+    for (first_layer, set) in (0..).step_by(layers as usize).zip(sets) {
+        let mut pass = graph.pass(format!("{NAME}.cells {name}"), PassKind::Compute);
+        pass.read(bits, Access::Sampled(Stage::Compute));
+        pass.read(groups, Access::Uniform(Stage::Compute));
+        let part = ImagePart {
+            base_mip: 0,
+            mips: 1,
+            base_layer: first_layer,
+            layers,
+        };
+        cells = pass.overwrite_part(cells, part, Access::StorageWrite(Stage::Compute));
+        let written = cells;
+        let nearer = u32::from(*set == Counted::Nearer);
+        pass.record(move |ctx| {
+            let shader = &spirv::OCCLUSION_TEXTURES_CELLS_COMP;
+            let bindings = [
+                Bind::sampled(0, bits, SamplerDesc::nearest()),
+                Bind::uniform(1, groups),
+                Bind::storage_image(2, written).part(part).array(),
+            ];
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(0, words), (1, detail), (2, nearer)],
+                ..ComputePipelineDesc::new(shader)
+            };
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            ctx.dispatch(shader.groups([side, side, batches]));
+            Ok(())
+        });
+    }
+    cells
 }
 
 /// Push constants of `average_level.comp`.

@@ -17,7 +17,11 @@ pub(super) struct OcclusionView {
     pub range: [f32; 4],
     pub half_x: [f32; 4],
     pub half_y: [f32; 4],
+    pub border: [f32; 4],
 }
+
+/// No border: beyond it nothing blocks.
+const EMPTY_BEYOND: [f32; 4] = [-1.0e9, -1.0e9, 1.0e9, 1.0e9];
 
 /// A view with what it takes to draw it.
 #[derive(Clone, Debug, PartialEq)]
@@ -228,6 +232,7 @@ fn sun_view(
     let params = OcclusionView {
         half_x: half,
         half_y: half,
+        border: EMPTY_BEYOND,
         ..OcclusionView::default()
     };
     let kernel = (2.0 * tan * (far - near)).powi(2);
@@ -345,12 +350,21 @@ fn local_view(
         )
     })?;
     let (casters_low, casters_high) = widened(casters.0, casters.1, 0.0);
+    // Kernels may reach out of the image where it ends before the casters do: what is there is taken
+    // to be as what is inside.
+    let mut border = [0.0, 0.0, 1.0, 1.0];
     for axis in 0..2 {
         let (a, b) = (
             low[axis].max(casters_low[axis]),
             high[axis].min(casters_high[axis]),
         );
         if a < b {
+            if casters_low[axis] >= low[axis] {
+                border[axis] = EMPTY_BEYOND[axis];
+            }
+            if casters_high[axis] <= high[axis] {
+                border[2 + axis] = EMPTY_BEYOND[2 + axis];
+            }
             (low[axis], high[axis]) = (a, b);
         }
     }
@@ -359,6 +373,7 @@ fn local_view(
     let params = OcclusionView {
         half_x: row(half_x),
         half_y: row(half_y),
+        border,
         ..OcclusionView::default()
     };
     let extent = Extent {

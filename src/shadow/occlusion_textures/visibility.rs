@@ -63,7 +63,7 @@ pub(super) fn add_visibility<'f>(
     ];
     let (shader, sampler) = match options.filter {
         Filter::SummedAreas => {
-            constants.push((2, u32::from(filtered.packed)));
+            constants.extend([(2, u32::from(filtered.packed)), (3, filtered.levels)]);
             let shader = &spirv::OCCLUSION_TEXTURES_VISIBILITY_TABLES_COMP;
             (shader, SamplerDesc::nearest())
         }

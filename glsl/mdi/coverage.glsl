@@ -40,6 +40,11 @@ vec4 fetch_texture_texel(ivec2 place) {
     return texelFetch(texels, place, 0);
 }
 
+// Of a depth along the view, metres: what `place_of` takes.
+float depth_s(float z) {
+    return params.views[push.view].forward.w > 0.0 ? 1.0 / z : -z;
+}
+
 // Defined by the entry file. nearest, farthest: depths along the view between which the triangle
 // lies within the texel, metres; z: at its centre.
 void cover_texel(ivec2 texel, float z, float nearest, float farthest);

@@ -10,37 +10,40 @@ const uint LIST_WIDTH = 4096u;
 // Rays of a table.
 const uint MAX_RAYS = 256u;
 
+// Bits of the options.
+const uint RANDOM_PLACES = 1u;
+const uint PIXEL_FOOTPRINT = 2u;
+
 struct MdiParams {
-    uvec4 counts; // views, texels across and down a view, depths that lists have room for, triangles
-    vec4 origin;  // xyz: what views are relative to: the light, of a sun the origin of scene space
+    uvec4 counts;  // views, texels across and down a view, depths that lists have room for, triangles
+    uvec4 options; // buckets, 1 where surfaces mark the nearest boundary and 0 both of a bucket, rays,
+                   // RANDOM_PLACES | PIXEL_FOOTPRINT
+    vec4 origin;   // xyz: what views are relative to: the light, of a sun the origin of scene space
     LightView views[MAX_LIGHT_VIEWS];
-    // x: scaled depth where bucket 0 begins, y: buckets for 1 more of it, z: its inverse. Depth z is
-    // scaled as metres, or as -1 / (z + w) where BUCKETS_RECIPROCAL is set.
-    vec4 buckets[MAX_LIGHT_VIEWS];
+    vec4 places[MAX_LIGHT_VIEWS];  // place = (x + y s) / (z + w s): bucket k is from k to k + 1
     vec4 nearest[MAX_LIGHT_VIEWS]; // x: depth along the view that triangles are cut off at, metres
 };
 
-layout(constant_id = 20) const uint BUCKETS = 32u;
-layout(constant_id = 21) const uint BUCKETS_RECIPROCAL = 0u;
-layout(constant_id = 22) const uint MARK_NEAREST = 0u; // else both ends of a bucket
-const uint WORDS = (BUCKETS + 31u) / 32u;
-
-// Where a depth along a view, metres, lies among the buckets: bucket k from k to k + 1.
-float bucket_place(vec4 buckets, float z) {
-    float scaled = BUCKETS_RECIPROCAL != 0u ? -1.0 / (z + buckets.w) : z;
-    return (scaled - buckets.x) * buckets.y;
+// Where a depth lies among the buckets. s: 1 / z for a depth z along a perspective view, metres; -z
+// along a sun's.
+float place_of(vec4 places, float s) {
+    return (places.x + places.y * s) / (places.z + places.w * s);
 }
 
-// The bucket of a place, or the boundary nearest to it where MARK_NEAREST is set.
-int bucket_of(float place) {
-    float at = MARK_NEAREST != 0u ? place + 0.5 : place;
-    return int(clamp(floor(at), 0.0, float(BUCKETS) - 1.0));
+// Inverse of `place_of`.
+float s_of(vec4 places, float place) {
+    return (places.x - places.z * place) / (places.w * place - places.y);
 }
 
-// Depth along a view of the boundary where bucket k begins, metres.
-float boundary_depth(vec4 buckets, int k) {
-    float scaled = float(k) * buckets.z + buckets.x;
-    return BUCKETS_RECIPROCAL != 0u ? -1.0 / scaled - buckets.w : scaled;
+// The bucket of a place, or the boundary nearest to it where surfaces mark that. options: of MdiParams.
+int bucket_of(uvec4 options, float place) {
+    float at = options.y != 0u ? place + 0.5 : place;
+    return int(clamp(floor(at), 0.0, float(options.x) - 1.0));
+}
+
+// Words of a texel's mask, each a layer of the image of boundaries.
+uint words_of(uvec4 options) {
+    return options.x / 32u;
 }
 
 ivec2 list_place(uint index) {

@@ -3,6 +3,10 @@
 // rays from each pixel's surface to the light, tested where they cross the boundaries between depth
 // buckets against a bit for each boundary and texel. Where the receiver's own plane lies in one of
 // the two buckets that meet there, the depths themselves are compared with it.
+//
+// What no ray of the fan reaches is found first, by halving ranges of boundaries. Each ray then goes
+// through the pyramid of texels: one fetch tests all boundaries of a word that it crosses within a
+// cell, and cells without any of them are left behind whole.
 
 #include "common/light_above.glsl"
 #include "common/octahedral.glsl"
@@ -13,7 +17,6 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const uint LIGHT_SHAPE = 1u;
-layout(constant_id = 1) const uint RAYS = 64u;
 
 layout(set = 0, binding = 0, std140) uniform ViewBlock {
     ViewParams view;
@@ -35,18 +38,33 @@ layout(set = 0, binding = 10, std140) uniform RayBlock {
     vec4 rays[MAX_RAYS]; // xy: place on the light, -1 to 1 along its axes; z: weight, all sum to 1
 };
 
-// Rounding of depths, as a part of them: 16 units of single precision's last place.
-const float DEPTH_ROUNDING = 1.0 / 1048576.0;
+// Rounding of depths and places, as a part of them: 16 units of single precision's last place.
+const float ROUNDING = 1.0 / 1048576.0;
 
-struct Receiver {
-    vec3 position; // along the view's axes, metres from the light, of a sun from the scene's origin
-    vec3 normal;   // along the view's axes
-    vec3 center;   // of the light, as it shows from here; of a sun the direction towards it
-    vec3 axis_x;   // from the centre to the light's rim
-    vec3 axis_y;
-    uint index;    // of the view
-    LightView light_view;
-    vec4 buckets;
+// Cells of the pyramid that a ray starts in are 2^FIRST_LEVEL texels wide.
+const int FIRST_LEVEL = 1;
+
+// Texels across and down that are looked at one by one, for all rays at once.
+const int MOST_ALIKE = 3;
+
+// What all rays of a pixel share. Along a ray, s grows towards the light and places in the map are
+// affine in it: 1 / z, of a sun -z, with z the depth along the view in metres.
+struct Fan {
+    int layer;     // of the view's first word
+    int own;       // the receiver's boundary
+    vec4 places;   // of the buckets
+    vec2 start;    // the receiver in texels
+    float s;       // of the receiver
+    vec4 middle;   // xy / z: how many texels a ray moves for each unit of s; w: above the plane if > 0
+    vec4 along_x;  // the same, for a step from the light's centre to its rim
+    vec4 along_y;
+    vec2 low;      // least and greatest texels of all rays for each unit of s
+    vec2 high;
+    vec3 plane;    // dot product with (texels, s) from the receiver: > 0 on the light's side
+    vec2 rounding; // of that: x + y * abs(s)
+    mat2 spread;   // texels that a ray begins off the middle for each unit of its place on the light
+    float growth;  // by how much the last grows for each unit of s
+    uint seed;     // of random places
 };
 
 vec3 in_view(LightView light_view, vec3 v) {
@@ -54,155 +72,261 @@ vec3 in_view(LightView light_view, vec3 v) {
         dot(v, light_view.forward.xyz));
 }
 
-// How a ray to a place of the light moves across the view for each metre towards the light.
-vec2 ray_slope(Receiver receiver, vec3 place) {
-    return receiver.light_view.forward.w > 0.0
-        ? (place.xy - receiver.position.xy) / (receiver.position.z - place.z)
-        : place.xy / -place.z;
-}
-
-// Texels of the map where a line from the receiver is at a depth.
-vec2 texel_at(Receiver receiver, vec2 slope, float z) {
-    LightView light_view = receiver.light_view;
-    vec2 at = receiver.position.xy + (receiver.position.z - z) * slope;
-    at = light_view.forward.w > 0.0 ? at / z : at;
+// center, axis_x, axis_y: the light along the axes of the view, metres; of a sun directions.
+// position, normal: the receiver.
+Fan fan_of(uint index, vec3 position, vec3 normal, vec3 center, vec3 axis_x, vec3 axis_y) {
+    LightView light_view = params.views[index];
+    bool perspective = LIGHT_SHAPE != LIGHT_SUN;
+    vec2 scale = light_view.scale.xy * float(params.counts.y);
     vec2 corner = vec2(light_view.right.w, light_view.up.w);
-    return (at - corner) * light_view.scale.xy * float(params.counts.y);
-}
+    float z = position.z;
+    Fan fan;
+    fan.layer = int(index * words_of(params.options));
+    fan.places = params.places[index];
+    fan.s = perspective ? 1.0 / z : -z;
+    fan.own = bucket_of(params.options, place_of(fan.places, fan.s));
+    vec2 at = perspective ? position.xy * fan.s : position.xy;
+    fan.start = (at - corner) * scale;
 
-// Boundaries of a word that are blocked anywhere in a rectangle of texels.
-uint blocked_in(Receiver receiver, int word, vec2 low, vec2 high) {
-    float size = float(params.counts.y);
-    ivec2 first = ivec2(clamp(floor(low), 0.0, size - 1.0));
-    ivec2 last = ivec2(clamp(floor(high), 0.0, size - 1.0));
-    ivec2 span = last - first;
-    int level = findMSB(uint(max(span.x, span.y))) + 1;
-    level = min(level, textureQueryLevels(boundaries) - 1);
-    first >>= level;
-    last >>= level;
-    int layer = int(receiver.index * WORDS) + word;
-    uint bits = texelFetch(boundaries, ivec3(first, layer), level).x;
-    bits |= texelFetch(boundaries, ivec3(last, layer), level).x;
-    bits |= texelFetch(boundaries, ivec3(first.x, last.y, layer), level).x;
-    return bits | texelFetch(boundaries, ivec3(last.x, first.y, layer), level).x;
-}
+    // A line from the receiver to a place p of the light meets depth 0 at (z p.xy - p.z xy) / (z - p.z).
+    vec2 aside = perspective ? position.xy : vec2(0.0);
+    float ahead = perspective ? z : 1.0;
+    float behind = perspective ? z : 0.0;
+    fan.middle = vec4((center.xy * ahead - aside * center.z) * scale, behind - center.z,
+        dot(normal, perspective ? center - position : center));
+    fan.along_x = vec4((axis_x.xy * ahead - aside * axis_x.z) * scale, -axis_x.z, dot(normal, axis_x));
+    fan.along_y = vec4((axis_y.xy * ahead - aside * axis_y.z) * scale, -axis_y.z, dot(normal, axis_y));
+    fan.spread = mat2(0.0);
+    fan.seed = 0u;
+    fan.growth = abs(center.z) + abs(axis_x.z) + abs(axis_y.z);
+    fan.growth = perspective ? fan.growth * z / max(z - fan.growth, 1.0e-3 * z) : 0.0;
+    fan.low = vec2(1.0e30);
+    fan.high = vec2(-1.0e30);
+    for (int i = 0; i < 4; ++i) {
+        vec2 side = vec2(i & 1, i >> 1) * 2.0 - 1.0;
+        vec4 ray = fan.middle + side.x * fan.along_x + side.y * fan.along_y;
+        // Places beside the receiver or deeper are seen anywhere.
+        fan.low = min(fan.low, ray.z > 0.0 ? ray.xy / ray.z : vec2(-1.0e30));
+        fan.high = max(fan.high, ray.z > 0.0 ? ray.xy / ray.z : vec2(1.0e30));
+    }
 
-// Depth of the receiver's plane along the view at the centre of a texel, metres; what rounding of
-// positions and normals may move it by; the nearest depth within the texel, 0 where the plane leaves
-// the view.
-vec3 plane_depth(Receiver receiver, vec2 texel) {
-    LightView light_view = receiver.light_view;
-    vec2 corner = vec2(light_view.right.w, light_view.up.w);
-    vec2 texel_size = 1.0 / (light_view.scale.xy * float(params.counts.y));
-    vec2 at = (texel + 0.5) * texel_size + corner;
-    float height = dot(receiver.normal, receiver.position);
-    float across = dot(receiver.normal.xy, at);
-    float reach = 0.5 * dot(abs(receiver.normal.xy), abs(texel_size));
-    bool perspective = light_view.forward.w > 0.0;
-    float facing = perspective ? across + receiver.normal.z : receiver.normal.z;
-    float depth = perspective ? height / facing : (height - across) / facing;
+    fan.plane = vec3(normal.xy / scale, -(perspective ? dot(normal, position) : normal.z));
     // Places in the view are sums of its corner and extent, and offsets differences from its origin:
     // what these round off stays where position and place themselves are near 0.
+    float size = length(position) + length(params.origin.xyz);
     float extent = length(corner) + length(1.0 / light_view.scale.xy);
-    float size = length(receiver.position) + length(params.origin.xyz)
-        + extent * (perspective ? abs(depth) : 1.0);
-    float slack = (size + abs(depth)) * DEPTH_ROUNDING / max(abs(facing), 1.0e-6);
-    float steepest = abs(facing) + reach;
-    float nearest = perspective ? abs(height) / steepest : depth - reach / abs(facing);
-    bool inside = !perspective || height * facing > 0.0;
-    return vec3(depth, slack, inside ? nearest : -1.0e30);
+    fan.rounding = (perspective ? vec2(extent + 1.0, size) : vec2(size + extent, 1.0)) * ROUNDING;
+    return fan;
 }
 
-// Whether a depth of the buckets around a boundary is in front of the receiver's plane.
-bool depths_block(Receiver receiver, ivec2 texel, int k, vec3 plane) {
-    uvec2 head = texelFetch(heads, ivec3(texel, receiver.index), 0).xy;
-    bool blocked = false;
-    for (uint i = 0u; i < head.y && !blocked; ++i) {
-        float z = uintBitsToFloat(texelFetch(lists, list_place(head.x + i), 0).x);
-        int bucket = bucket_of(bucket_place(receiver.buckets, z));
-        if (bucket > k || z >= plane.x - plane.y) {
-            break;
+// xy: place on the light, z: weight.
+vec3 ray_of(Fan fan, uint i) {
+    vec3 ray = rays[i].xyz;
+    if ((params.options.w & RANDOM_PLACES) != 0u) {
+        // Two steps of a permuted congruential generator (O'Neill 2014) on each number.
+        uvec2 bits = uvec2(fan.seed, i) * 1664525u + 1013904223u;
+        bits.x += bits.y * 1664525u;
+        bits.y += bits.x * 1664525u;
+        bits ^= bits >> 16;
+        bits.x += bits.y * 1664525u;
+        bits.y += bits.x * 1664525u;
+        bits ^= bits >> 16;
+        vec2 part = vec2(bits >> 8) / 16777216.0;
+        float angle = 6.2831853 * part.y;
+        bool round = LIGHT_SHAPE != LIGHT_RECT && LIGHT_SHAPE != LIGHT_LINE;
+        ray.xy = round ? sqrt(part.x) * vec2(cos(angle), sin(angle)) : 2.0 * part - 1.0;
+    }
+    return ray;
+}
+
+// Half of what a pixel shows of its surface, along the light's axes as the view has them: so that
+// places of the one and of the other lie in the same order. Metres along the view's x and y.
+mat2 pixel_spread(uvec2 pixel, float depth, vec3 n, LightView light_view, vec2 axis_x, vec2 axis_y) {
+    vec3 ray = pixel_ray(view.camera, pixel);
+    vec2 sides[2];
+    for (uint i = 0u; i < 2u; ++i) {
+        vec3 across = i == 0u ? view.camera.pixel_right.xyz : view.camera.pixel_down.xyz;
+        vec3 next = ray + across;
+        float facing = dot(n, next);
+        // Where the surface is seen edge-on, no more than 8 times what it is from the front.
+        float stretch = dot(n, across) / (abs(facing) > 1.0e-20 ? facing : 1.0e-20);
+        vec3 side = depth * (across - next * stretch);
+        side *= min(1.0, 8.0 * depth * length(across) / max(length(side), 1.0e-30));
+        sides[i] = in_view(light_view, side).xy;
+    }
+    vec2 a = dot(axis_x, axis_x) > 0.0 ? normalize(axis_x) : vec2(1.0, 0.0);
+    vec2 b = vec2(-a.y, a.x);
+    b = dot(b, axis_y) < 0.0 ? -b : b;
+    return 0.5 * mat2(a * (abs(dot(a, sides[0])) + abs(dot(a, sides[1]))),
+        b * (abs(dot(b, sides[0])) + abs(dot(b, sides[1]))));
+}
+
+// Whether a place is on the light's side of the receiver's plane by more than rounding.
+// texels: from the receiver.
+bool in_front(Fan fan, vec2 texels, float s, float margin) {
+    float height = dot(fan.plane, vec3(texels, s - fan.s));
+    return height - margin > fan.rounding.x + fan.rounding.y * abs(s);
+}
+
+// Whether something at a marked boundary of a texel is on the light's side of the receiver's plane.
+bool is_blocked(Fan fan, ivec2 texel, int k) {
+    vec2 texels = vec2(texel) + 0.5 - fan.start;
+    // All of the boundary's two buckets in front of the plane, everywhere in the texel?
+    float half_range = params.options.y != 0u ? 0.501 : 1.001;
+    float farthest = s_of(fan.places, float(k) + (fan.plane.z > 0.0 ? half_range : -half_range));
+    float reach = 0.5 * (abs(fan.plane.x) + abs(fan.plane.y));
+    bool blocked = in_front(fan, texels, farthest, reach);
+    if (!blocked) {
+        uvec2 head = texelFetch(heads, ivec3(texel, fan.layer / int(words_of(params.options))), 0).xy;
+        int bucket = 0;
+        for (uint i = 0u; i < head.y && bucket <= k && !blocked; ++i) {
+            float z = uintBitsToFloat(texelFetch(lists, list_place(head.x + i), 0).x);
+            float s = LIGHT_SHAPE == LIGHT_SUN ? -z : 1.0 / z;
+            bucket = bucket_of(params.options, place_of(fan.places, s));
+            bool near = bucket <= k && bucket >= (params.options.y != 0u ? k : k - 1);
+            blocked = near && in_front(fan, texels, s, 0.0);
         }
-        blocked = bucket >= (MARK_NEAREST != 0u ? k : k - 1);
     }
     return blocked;
 }
 
-// Whether something blocks a ray at boundary k.
-bool blocked_at(Receiver receiver, vec2 slope, int k, float z) {
+// Where a boundary is, or the receiver if that is nearer.
+float boundary_s(Fan fan, int k) {
+    return max(s_of(fan.places, float(k)), fan.s);
+}
+
+// Boundaries that rays may be blocked at: a bit each.
+uvec4 reached(Fan fan) {
+    uvec4 found = uvec4(0u);
     float size = float(params.counts.y);
-    vec2 texel = floor(texel_at(receiver, slope, z));
-    if (any(notEqual(texel, clamp(texel, 0.0, size - 1.0)))) {
-        return false;
+    int k = fan.own;
+    int count = 32;
+    while (k >= 0) {
+        int first = max(k - count + 1, k & ~31);
+        float near = boundary_s(fan, first) - fan.s;
+        float far = boundary_s(fan, k) - fan.s;
+        vec2 spread = abs(fan.spread[0]) + abs(fan.spread[1]);
+        spread *= 1.0 + fan.growth * near;
+        vec2 low = fan.start + min(fan.low * near, fan.low * far) - spread;
+        vec2 high = fan.start + max(fan.high * near, fan.high * far) + spread;
+        ivec2 from = ivec2(clamp(floor(low), 0.0, size - 1.0));
+        ivec2 to = ivec2(clamp(floor(high), 0.0, size - 1.0));
+        ivec2 span = to - from;
+        int level = findMSB(max(span.x, span.y)) + 1;
+        ivec2 a = from >> level;
+        ivec2 b = to >> level;
+        int layer = fan.layer + (k >> 5);
+        uint bits = texelFetch(boundaries, ivec3(a, layer), level).x
+            | texelFetch(boundaries, ivec3(b, layer), level).x
+            | texelFetch(boundaries, ivec3(b.x, a.y, layer), level).x
+            | texelFetch(boundaries, ivec3(a.x, b.y, layer), level).x;
+        bits &= (0xFFFFFFFFu << (first & 31)) & (0xFFFFFFFFu >> (31 - (k & 31)));
+        if (bits == 0u) {
+            k = first - 1;
+            count = min(2 * count, 32);
+        } else if (first < k) {
+            k = (k & ~31) + findMSB(bits);
+            count = max(count >> 1, 1);
+        } else {
+            // Few texels, as around the receiver: its own surface need not keep any ray.
+            bool blocked = max(span.x, span.y) >= MOST_ALIKE;
+            ivec2 texel = from;
+            while (!blocked && texel.y <= to.y) {
+                uint here = texelFetch(boundaries, ivec3(texel, layer), 0).x;
+                blocked = (here & bits) != 0u && is_blocked(fan, texel, k);
+                texel = texel.x < to.x ? texel + ivec2(1, 0) : ivec2(from.x, texel.y + 1);
+            }
+            found[k >> 5] |= blocked ? bits : 0u;
+            --k;
+        }
     }
-    ivec3 place = ivec3(ivec2(texel), int(receiver.index * WORDS) + (k >> 5));
-    if ((texelFetch(boundaries, place, 0).x >> (k & 31) & 1u) == 0u) {
-        return false;
+    return found;
+}
+
+// Those of the open rays that pass all marked boundaries of a word.
+uint passing(Fan fan, uint first_ray, uint open, int word, uint marks) {
+    float size = float(params.counts.y);
+    int top = textureQueryLevels(boundaries) - 1;
+    uint waiting = open;
+    uint left = 0u; // boundaries that the ray has to pass yet
+    int ray = 0;
+    int level = 0;
+    vec2 start = vec2(0.0);
+    vec2 slope = vec2(0.0);
+    while (left != 0u || waiting != 0u) {
+        if (left == 0u) {
+            ray = findLSB(waiting);
+            waiting &= waiting - 1u;
+            vec2 place = ray_of(fan, first_ray + uint(ray)).xy;
+            vec4 course = fan.middle + place.x * fan.along_x + place.y * fan.along_y;
+            float place_z = 1.0 / fan.s - course.z;
+            vec2 aside = fan.spread * place;
+            start = fan.start + aside;
+            aside *= LIGHT_SHAPE == LIGHT_SUN ? 0.0 : place_z / fan.s;
+            slope = (course.xy - aside) / course.z;
+            slope = mix(slope, vec2(1.0e-30), lessThan(abs(slope), vec2(1.0e-30)));
+            level = FIRST_LEVEL;
+            // A light may reach among the boundaries: those behind its place cannot hide it.
+            float end = LIGHT_SHAPE != LIGHT_SUN && place_z > 0.0 ? place_of(fan.places, 1.0 / place_z) + 1.0 : 0.0;
+            int least = int(clamp(end - float(32 * word), 0.0, 32.0));
+            left = course.z > 0.0 && least < 32 ? marks & (0xFFFFFFFFu << least) : 0u;
+        }
+        if (left != 0u) {
+            int bit = findMSB(left);
+            float s = boundary_s(fan, 32 * word + bit);
+            vec2 at = floor(start + slope * (s - fan.s));
+            if (any(notEqual(at, clamp(at, 0.0, size - 1.0)))) {
+                left = 0u;
+            } else {
+                ivec2 cell = ivec2(at) >> level;
+                vec2 edge = vec2((cell + ivec2(greaterThan(slope, vec2(0.0)))) << level);
+                vec2 leaves = (edge - start) / slope;
+                float last = ceil(place_of(fan.places, fan.s + min(leaves.x, leaves.y)));
+                int least = int(clamp(last - float(32 * word), 0.0, float(bit)));
+                uint crossed = left & (0xFFFFFFFFu << least);
+                ivec3 place = ivec3(cell, fan.layer + word);
+                uint hit = crossed & texelFetch(boundaries, place, level).x;
+                left ^= crossed ^ hit;
+                if (hit == 0u) {
+                    level = min(level + 1, top);
+                } else if (level > 0) {
+                    level -= 1;
+                } else {
+                    bit = findMSB(hit);
+                    bool blocked = is_blocked(fan, cell, 32 * word + bit);
+                    open ^= blocked ? 1u << ray : 0u;
+                    left = blocked ? 0u : left ^ (1u << bit);
+                }
+            }
+        }
     }
-    // Behind the boundary's farther bucket the receiver's plane can be disregarded.
-    vec3 plane = plane_depth(receiver, texel);
-    float farthest_of_ours = float(k) + (MARK_NEAREST != 0u ? 0.501 : 1.001);
-    bool clear = plane.z > -1.0e29
-        && bucket_place(receiver.buckets, plane.z - plane.y) > farthest_of_ours;
-    return clear || depths_block(receiver, place.xy, k, plane);
+    return open;
 }
 
 // The part of the light that is seen, of that above the receiver's plane.
-float traced(Receiver receiver) {
-    bool perspective = receiver.light_view.forward.w > 0.0;
-    // The range of slopes.
-    vec2 low = vec2(1.0e30);
-    vec2 high = vec2(-1.0e30);
-    for (int i = 0; i < 4; ++i) {
-        vec2 s = vec2(i & 1, i >> 1) * 2.0 - 1.0;
-        vec2 slope = ray_slope(receiver, receiver.center + s.x * receiver.axis_x + s.y * receiver.axis_y);
-        low = min(low, slope);
-        high = max(high, slope);
+float traced(Fan fan) {
+    uvec4 marks = reached(fan);
+    if (marks == uvec4(0u)) {
+        return 1.0;
     }
-    int own = bucket_of(bucket_place(receiver.buckets, receiver.position.z));
     float seen = 0.0;
     float above = 0.0;
-    for (uint batch = 0u; batch < RAYS; batch += 32u) {
+    uint count = params.options.z;
+    for (uint first = 0u; first < count; first += 32u) {
         uint open = 0u;
-        for (uint i = batch; i < min(batch + 32u, RAYS); ++i) {
-            vec3 place = receiver.center + rays[i].x * receiver.axis_x + rays[i].y * receiver.axis_y;
-            vec3 direction = perspective ? place - receiver.position : place;
-            bool over = dot(receiver.normal, direction) > 0.0;
-            open |= over ? 1u << (i - batch) : 0u;
-            above += over ? rays[i].z : 0.0;
+        for (uint i = first; i < min(first + 32u, count); ++i) {
+            vec3 ray = ray_of(fan, i);
+            bool over = fan.middle.w + ray.x * fan.along_x.w + ray.y * fan.along_y.w > 0.0;
+            open |= over ? 1u << (i - first) : 0u;
+            above += over ? ray.z : 0.0;
         }
-        for (int word = own >> 5; word >= 0 && open != 0u; --word) {
-            uint bits = 0xFFFFFFFFu >> max(31 - (own - 32 * word), 0);
-            float nearest = boundary_depth(receiver.buckets, 32 * word);
-            vec2 here = texel_at(receiver, vec2(0.0), receiver.position.z);
-            vec2 a = texel_at(receiver, low, nearest);
-            vec2 b = texel_at(receiver, high, nearest);
-            bits &= blocked_in(receiver, word, min(here, min(a, b)), max(here, max(a, b)));
-            while (bits != 0u && open != 0u) {
-                int k = findMSB(bits);
-                bits ^= 1u << k;
-                k += 32 * word;
-                float z = min(boundary_depth(receiver.buckets, k), receiver.position.z);
-                a = texel_at(receiver, low, z);
-                b = texel_at(receiver, high, z);
-                uint reached = blocked_in(receiver, word, min(a, b), max(a, b));
-                uint left = (reached >> (k & 31) & 1u) != 0u ? open : 0u;
-                while (left != 0u) {
-                    int i = findLSB(left);
-                    left &= left - 1u;
-                    vec2 s = rays[batch + uint(i)].xy;
-                    vec3 place = receiver.center + s.x * receiver.axis_x + s.y * receiver.axis_y;
-                    bool beyond = perspective && place.z >= z;
-                    if (!beyond && blocked_at(receiver, ray_slope(receiver, place), k, z)) {
-                        open ^= 1u << i;
-                    }
-                }
-            }
+        for (int word = fan.own >> 5; word >= 0; --word) {
+            open = passing(fan, first, open, word, marks[word]);
         }
         while (open != 0u) {
             int i = findLSB(open);
             open &= open - 1u;
-            seen += rays[batch + uint(i)].z;
+            seen += rays[first + uint(i)].z;
         }
     }
     return above > 0.0 ? min(seen / above, 1.0) : 1.0;
@@ -258,20 +382,22 @@ float pixel_visibility(uvec2 pixel) {
             at = light_view_project(params.views[found], q);
         }
         if (all(equal(at.xy, clamp(at.xy, 0.0, 1.0)))) {
-            Receiver receiver;
-            receiver.index = found;
-            receiver.light_view = params.views[found];
-            receiver.buckets = params.buckets[found];
-            receiver.position = in_view(receiver.light_view, q);
-            receiver.normal = in_view(receiver.light_view, n);
+            LightView light_view = params.views[found];
             vec3 center;
             vec3 axis_x;
             vec3 axis_y;
             place_light(p, center, axis_x, axis_y);
-            receiver.center = in_view(receiver.light_view, center);
-            receiver.axis_x = in_view(receiver.light_view, axis_x);
-            receiver.axis_y = in_view(receiver.light_view, axis_y);
-            result = above * traced(receiver);
+            Fan fan = fan_of(found, in_view(light_view, q), in_view(light_view, n),
+                in_view(light_view, center), in_view(light_view, axis_x), in_view(light_view, axis_y));
+            fan.seed = pixel.y << 16 | pixel.x;
+            if ((params.options.w & PIXEL_FOOTPRINT) != 0u) {
+                mat2 spread = pixel_spread(pixel, depth, n, light_view,
+                    in_view(light_view, axis_x).xy, in_view(light_view, axis_y).xy);
+                vec2 texels = light_view.scale.xy * float(params.counts.y);
+                texels *= LIGHT_SHAPE == LIGHT_SUN ? 1.0 : fan.s;
+                fan.spread = mat2(spread[0] * texels, spread[1] * texels);
+            }
+            result = above * traced(fan);
         }
     }
     return result;

@@ -1,11 +1,11 @@
 //! Passes over all triangles: small ones with an invocation each, large ones with one for each row.
 
-use super::layers::{LIST_WIDTH, bucket_constants};
-use super::options::MdiOptions;
+use super::layers::LIST_WIDTH;
 use super::{NAME, ShadowInputs};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, Shader, spirv};
 use crate::graph::{
-    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassBuilder, PassKind, Stage,
+    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, ImagePart, PassBuilder,
+    PassKind, Stage,
 };
 use ash::vk;
 
@@ -18,6 +18,8 @@ pub(super) struct Coverage {
     constants: Vec<(u32, u32)>,
     triangles: u32,
     side: u32,
+    /// Of the image of boundaries.
+    finest: ImagePart,
     /// The large triangles of each view.
     large: Vec<Large>,
 }
@@ -32,30 +34,31 @@ struct Large {
 impl Coverage {
     pub(super) fn new(
         inputs: &ShadowInputs<'_>,
-        options: &MdiOptions,
         params: BufferId,
         side: u32,
+        finest: ImagePart,
     ) -> Self {
-        let mut constants = bucket_constants(options, inputs.light.shape.is_sun());
-        constants.push((0, u32::from(inputs.scene.has_masks())));
         Self {
             params,
-            constants,
+            constants: vec![(0, u32::from(inputs.scene.has_masks()))],
             triangles: inputs.scene.triangle_count() as u32,
             side,
+            finest,
             large: Vec::new(),
         }
     }
 
-    /// Counts depths and marks buckets of a view; the images are the counts and the masks.
+    /// Counts depths and marks boundaries of a view; the images are the counts and the boundaries,
+    /// whose finest level is marked.
     pub(super) fn add_count(
         &mut self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
         view: u32,
-        [mut counts, mut masks]: [ImageId; 2],
+        [mut counts, mut boundaries]: [ImageId; 2],
     ) -> [ImageId; 2] {
         let name = format!("{}.{view}", inputs.light_name);
+        let finest = self.finest;
         let arguments =
             graph.create_buffer(format!("{NAME}.arguments {name}"), BufferDesc { size: 16 });
         let rows = self.triangles.div_ceil(LIST_WIDTH).max(1);
@@ -71,12 +74,12 @@ impl Coverage {
         self.read(&mut pass, inputs);
         let storage = Access::StorageReadWrite(Stage::Compute);
         counts = pass.write(counts, storage);
-        masks = pass.write(masks, storage);
+        boundaries = pass.write_part(boundaries, finest, storage);
         let arguments = pass.write(arguments, storage);
         let list = pass.overwrite(list, Access::StorageWrite(Stage::Compute));
         let images = [
             Bind::storage_image(5, counts).array(),
-            Bind::storage_image(6, masks).array(),
+            Bind::storage_image(6, boundaries).part(finest).array(),
         ];
         let mut bindings = images.to_vec();
         bindings.push(Bind::storage_buffer(7, arguments));
@@ -88,15 +91,15 @@ impl Coverage {
         let mut pass = graph.pass(format!("{NAME}.count_large {name}"), PassKind::Compute);
         self.read(&mut pass, inputs);
         counts = pass.write(counts, storage);
-        masks = pass.write(masks, storage);
+        boundaries = pass.write_part(boundaries, finest, storage);
         let shader = &spirv::MDI_COUNT_LARGE_COMP;
         let bindings = vec![
             Bind::storage_image(5, counts).array(),
-            Bind::storage_image(6, masks).array(),
+            Bind::storage_image(6, boundaries).part(finest).array(),
         ];
         large.read(&mut pass);
         self.record(pass, inputs, (shader, bindings), view, Some(large));
-        [counts, masks]
+        [counts, boundaries]
     }
 
     /// Fills the lists of a view; the images are the counts, which end as 0, and the lists.

@@ -1,10 +1,10 @@
 //! The multi-layer depth image: for each texel a mask of buckets and a sorted list of depths.
 
 use super::coverage::Coverage;
-use super::options::{Buckets, MdiOptions};
+use super::options::MdiOptions;
 use super::views::MdiViews;
 use super::{NAME, ShadowInputs};
-use crate::gpu::{ComputePipelineDesc, SamplerDesc, Shader, spirv};
+use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
     Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, ImagePart, PassKind, Stage,
 };
@@ -28,16 +28,6 @@ pub(super) struct Layers {
     pub lists: ImageId,
 }
 
-/// Specialization constants of `mdi/params.glsl`.
-pub(super) fn bucket_constants(options: &MdiOptions, sun: bool) -> Vec<(u32, u32)> {
-    let reciprocal = options.spacing == Buckets::Reciprocal && !sun;
-    vec![
-        (20, options.buckets),
-        (21, u32::from(reciprocal)),
-        (22, u32::from(options.nearest)),
-    ]
-}
-
 pub(super) fn add_layers<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
@@ -47,33 +37,34 @@ pub(super) fn add_layers<'f>(
     let name = &inputs.light_name;
     let (params, rays) = add_params(graph, name, views);
     let count = views.count.max(1);
-    let side = if views.count > 0 {
-        options.resolution
-    } else {
-        1
-    };
+    let side = if views.count > 0 { views.side } else { 1 };
     let words = options.words();
     let image = |format, layers| ImageDesc::new(format, side, side).layers(layers);
     let counts = graph.create_image(
         format!("{NAME}.counts {name}"),
         image(vk::Format::R32_UINT, count),
     );
-    let masks = graph.create_image(
-        format!("{NAME}.masks {name}"),
-        image(vk::Format::R32_UINT, count * words),
-    );
+    let desc = image(vk::Format::R32_UINT, count * words);
+    let mips = desc.max_mips();
+    let boundaries = graph.create_image(format!("{NAME}.boundaries {name}"), desc.mips(mips));
+    let level = move |level| ImagePart {
+        base_mip: level,
+        mips: 1,
+        base_layer: 0,
+        layers: count * words,
+    };
     let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
     let mut counts = pass.overwrite(counts, Access::Clear);
-    let mut masks = pass.overwrite(masks, Access::Clear);
+    let mut boundaries = pass.overwrite_part(boundaries, level(0), Access::Clear);
     pass.record(move |ctx| {
         ctx.clear_image(counts, [0.0; 4])?;
-        ctx.clear_image(masks, [0.0; 4])
+        ctx.clear_image(boundaries, [0.0; 4])
     });
-    let mut coverage = Coverage::new(inputs, options, params, side);
+    let mut coverage = Coverage::new(inputs, params, side, level(0));
     for view in 0..views.count {
-        [counts, masks] = coverage.add_count(graph, inputs, view, [counts, masks]);
+        [counts, boundaries] = coverage.add_count(graph, inputs, view, [counts, boundaries]);
     }
-    let heads = add_heads(graph, inputs, options, params, counts, side, count);
+    let heads = add_heads(graph, name, params, counts, side, count);
     let rows = (views.capacity.div_ceil(LIST_WIDTH)).max(1);
     let lists = graph.create_image(
         format!("{NAME}.lists {name}"),
@@ -88,23 +79,17 @@ pub(super) fn add_layers<'f>(
     let mut pass = graph.pass(format!("{NAME}.sort {name}"), PassKind::Compute);
     pass.read(heads, Access::Sampled(Stage::Compute));
     let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
-    let constants = bucket_constants(options, inputs.light.shape.is_sun());
-    let pipeline = move |shader| ComputePipelineDesc {
-        constants: constants.clone(),
-        ..ComputePipelineDesc::new(shader)
-    };
-    let sorted = pipeline.clone();
     pass.record(move |ctx| {
         let shader = &spirv::MDI_SORT_COMP;
         let bindings = [
             Bind::sampled(0, heads, SamplerDesc::nearest()).array(),
             Bind::storage_image(1, lists),
         ];
-        ctx.bind_compute(&sorted(shader), &bindings, &[])?;
+        ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
         ctx.dispatch(shader.groups([side, side, count]));
         Ok(())
     });
-    let boundaries = add_pyramid(graph, name, masks, side, count * words, pipeline);
+    let boundaries = add_pyramid(graph, name, boundaries, side, mips, level);
     Layers {
         params,
         rays,
@@ -132,14 +117,12 @@ fn add_params(graph: &mut Graph<'_>, name: &str, views: &MdiViews) -> (BufferId,
 
 fn add_heads(
     graph: &mut Graph<'_>,
-    inputs: &ShadowInputs<'_>,
-    options: &MdiOptions,
+    name: &str,
     params: BufferId,
     counts: ImageId,
     side: u32,
     count: u32,
 ) -> ImageId {
-    let name = &inputs.light_name;
     let desc = ImageDesc::new(vk::Format::R32_UINT, side, count);
     let sums = graph.create_image(format!("{NAME}.sums {name}"), desc);
     let mut pass = graph.pass(format!("{NAME}.rows {name}"), PassKind::Compute);
@@ -162,7 +145,6 @@ fn add_heads(
     pass.read(counts, Access::Sampled(Stage::Compute));
     pass.read(sums, Access::Sampled(Stage::Compute));
     let heads = pass.overwrite(heads, Access::StorageWrite(Stage::Compute));
-    let constants = bucket_constants(options, inputs.light.shape.is_sun());
     pass.record(move |ctx| {
         let shader = &spirv::MDI_HEADS_COMP;
         let nearest = SamplerDesc::nearest();
@@ -172,48 +154,22 @@ fn add_heads(
             Bind::sampled(2, sums, nearest),
             Bind::storage_image(3, heads).array(),
         ];
-        let pipeline = ComputePipelineDesc {
-            constants,
-            ..ComputePipelineDesc::new(shader)
-        };
-        ctx.bind_compute(&pipeline, &bindings, &[])?;
+        ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
         ctx.dispatch(shader.groups([side, count, 1]));
         Ok(())
     });
     heads
 }
 
+/// The coarser levels, each the OR of 2x2 texels of the one below. `part`: a level, all layers.
 fn add_pyramid<'f>(
     graph: &mut Graph<'f>,
     name: &str,
-    masks: ImageId,
+    mut image: ImageId,
     side: u32,
-    layers: u32,
-    pipeline: impl Fn(&'static Shader) -> ComputePipelineDesc + 'f,
+    mips: u32,
+    part: impl Fn(u32) -> ImagePart + Copy + 'f,
 ) -> ImageId {
-    let desc = ImageDesc::new(vk::Format::R32_UINT, side, side).layers(layers);
-    let mips = desc.max_mips();
-    let image = graph.create_image(format!("{NAME}.boundaries {name}"), desc.mips(mips));
-    let part = move |level| ImagePart {
-        base_mip: level,
-        mips: 1,
-        base_layer: 0,
-        layers,
-    };
-    let mut pass = graph.pass(format!("{NAME}.boundaries {name}.0"), PassKind::Compute);
-    pass.read(masks, Access::Sampled(Stage::Compute));
-    let mut image = pass.overwrite_part(image, part(0), Access::StorageWrite(Stage::Compute));
-    let written = image;
-    pass.record(move |ctx| {
-        let shader = &spirv::MDI_BOUNDARIES_COMP;
-        let bindings = [
-            Bind::sampled(0, masks, SamplerDesc::nearest()).array(),
-            Bind::storage_image(1, written).part(part(0)).array(),
-        ];
-        ctx.bind_compute(&pipeline(shader), &bindings, &[])?;
-        ctx.dispatch(shader.groups([side, side, layers]));
-        Ok(())
-    });
     for level in 1..mips {
         let mut pass = graph.pass(
             format!("{NAME}.boundaries {name}.{level}"),
@@ -232,7 +188,7 @@ fn add_pyramid<'f>(
             ];
             ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
             let size = (side >> level).max(1);
-            ctx.dispatch(shader.groups([size, size, layers]));
+            ctx.dispatch(shader.groups([size, size, part(level).layers]));
             Ok(())
         });
     }

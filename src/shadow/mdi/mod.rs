@@ -7,13 +7,17 @@
 //! it is blocked. Where the receiver's own plane passes through these buckets, the depths in the
 //! list are compared with it instead.
 //!
+//! Boundaries that no ray of a pixel's fan is blocked at are ruled out first, for all rays at once. A
+//! ray then goes through the pyramid's cells from boundary to boundary: one fetch tests the 32 of a
+//! word that it crosses within a cell.
+//!
 //! | pass | makes |
 //! |---|---|
 //! | `params` | views, buckets, rays |
-//! | `clear`, `count` | lengths of lists, masks of buckets |
+//! | `clear`, `count` | lengths of lists, masks of the boundaries that are blocked |
 //! | `rows`, `heads` | where each list begins: a prefix sum |
 //! | `fill`, `sort` | the lists |
-//! | `boundaries` | masks of boundaries, and a pyramid of what any of its texels has |
+//! | `boundaries` | a pyramid of the boundaries that are blocked in any of its texels |
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
 
@@ -23,13 +27,13 @@ mod options;
 mod rays;
 mod views;
 
-pub use options::{Buckets, MdiOptions};
+pub use options::{Buckets, Footprint, MdiOptions};
 
 use super::receivers::add_receivers;
 use super::{ShadowInputs, ShadowMask, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, Graph, PassKind, Stage};
-use layers::{Layers, bucket_constants};
+use layers::Layers;
 
 /// The technique's name.
 pub(super) const NAME: &str = "mdi";
@@ -47,16 +51,15 @@ pub(super) fn add_passes<'f>(
         &inputs.receivers,
         &boxes,
         triangles,
-        &options,
+        (&options, options.side(inputs.camera.size())),
     );
     let layers = layers::add_layers(graph, inputs, &options, &views);
-    add_visibility(graph, inputs, &options, &layers)
+    add_visibility(graph, inputs, &layers)
 }
 
 fn add_visibility<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
-    options: &MdiOptions,
     layers: &Layers,
 ) -> ShadowMask {
     let name = &inputs.light_name;
@@ -81,8 +84,7 @@ fn add_visibility<'f>(
     }
     list.read(&mut pass);
     let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
-    let mut constants = bucket_constants(options, light.shape.is_sun());
-    constants.extend([(0, shape_number(&light.shape)), (1, options.rays)]);
+    let constants = vec![(0, shape_number(&light.shape))];
     pass.record(move |ctx| {
         let nearest = SamplerDesc::nearest();
         let bindings = [

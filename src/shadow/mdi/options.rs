@@ -12,11 +12,23 @@ pub enum Buckets {
     Reciprocal,
 }
 
+/// Where a pixel's rays begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Footprint {
+    /// All at its centre's surface, as the ray-traced truth has it.
+    Point,
+    /// Over the part of the surface that it shows, each place mapped to one of the light: as
+    /// published, antialiased.
+    Pixel,
+}
+
 /// Options of `mdi`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MdiOptions {
-    /// Texels across and down each view's image, 64 to 2048, a multiple of 64.
-    pub resolution: u32,
+    /// Texels across and down each view's image, 64 to 2048, a power of two; `None` follows the
+    /// picture.
+    pub resolution: Option<u32>,
     /// Depth buckets: 32, 64 or 128.
     pub buckets: u32,
     /// How they lie.
@@ -25,6 +37,10 @@ pub struct MdiOptions {
     pub nearest: bool,
     /// Rays a pixel, 4 to 256.
     pub rays: u32,
+    /// Places on the light are random, other ones for each pixel, rather than the same fan.
+    pub random: bool,
+    /// Where rays begin.
+    pub footprint: Footprint,
     /// Depths that the lists have room for, per texel of all views on average, 1 to 64.
     pub depths: u32,
 }
@@ -32,11 +48,13 @@ pub struct MdiOptions {
 impl MdiOptions {
     /// What the technique does without options.
     pub const DEFAULT: Self = Self {
-        resolution: 1024,
+        resolution: None,
         buckets: 128,
         spacing: Buckets::Reciprocal,
         nearest: true,
         rays: 64,
+        random: false,
+        footprint: Footprint::Point,
         depths: 8,
     };
 
@@ -44,8 +62,8 @@ impl MdiOptions {
     pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
         option(
             "resolution",
-            "1024",
-            "64 to 2048, a multiple of 64",
+            "auto",
+            "64 to 2048, a power of two, or auto (4 times the picture's longer side, 256 to 1024)",
             "texels across and down each view's image",
         ),
         option("buckets", "128", "32, 64 or 128", "depth buckets"),
@@ -63,6 +81,18 @@ impl MdiOptions {
         ),
         option("rays", "64", "4 to 256", "rays a pixel"),
         option(
+            "pattern",
+            "fan",
+            "fan or random (other places for each pixel)",
+            "places on the light that rays go to",
+        ),
+        option(
+            "footprint",
+            "point",
+            "point or pixel (over what the pixel shows, antialiased)",
+            "places of the surface that rays begin at",
+        ),
+        option(
             "depths",
             "8",
             "1 to 64",
@@ -77,11 +107,18 @@ impl MdiOptions {
             Buckets::Reciprocal => "reciprocal",
         };
         vec![
-            self.resolution.to_string(),
+            self.resolution
+                .map_or("auto".to_string(), |texels| texels.to_string()),
             self.buckets.to_string(),
             spacing.to_string(),
             if self.nearest { "nearest" } else { "both" }.to_string(),
             self.rays.to_string(),
+            if self.random { "random" } else { "fan" }.to_string(),
+            match self.footprint {
+                Footprint::Point => "point",
+                Footprint::Pixel => "pixel",
+            }
+            .to_string(),
             self.depths.to_string(),
         ]
     }
@@ -92,7 +129,10 @@ impl MdiOptions {
             value.parse::<u32>().ok().filter(|n| range.contains(n))
         };
         match option {
-            "resolution" => self.resolution = number(64..=2048).filter(|n| n % 64 == 0)?,
+            "resolution" if value == "auto" => self.resolution = None,
+            "resolution" => {
+                self.resolution = Some(number(64..=2048).filter(|n| n.is_power_of_two())?);
+            }
             "buckets" => self.buckets = number(32..=128).filter(|n| n.is_power_of_two())?,
             "spacing" => {
                 self.spacing = match value {
@@ -109,10 +149,30 @@ impl MdiOptions {
                 }
             }
             "rays" => self.rays = number(4..=256)?,
+            "pattern" => {
+                self.random = match value {
+                    "fan" => false,
+                    "random" => true,
+                    _ => return None,
+                }
+            }
+            "footprint" => {
+                self.footprint = match value {
+                    "point" => Footprint::Point,
+                    "pixel" => Footprint::Pixel,
+                    _ => return None,
+                }
+            }
             "depths" => self.depths = number(1..=64)?,
             _ => return None,
         }
         Some(())
+    }
+
+    /// Texels across and down each view's image, for a picture of a size.
+    pub(super) fn side(&self, [width, height]: [u32; 2]) -> u32 {
+        let picture = width.max(height).saturating_mul(4).next_power_of_two();
+        self.resolution.unwrap_or(picture.clamp(256, 1024))
     }
 
     /// Words of a texel's mask.

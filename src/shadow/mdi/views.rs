@@ -1,6 +1,6 @@
 //! Views of a light and the depth range of their buckets.
 
-use super::options::{Buckets, MdiOptions};
+use super::options::{Buckets, Footprint, MdiOptions};
 use super::rays::{MOST_RAYS, Ray, ray_table};
 use crate::light::{AreaLight, LightShape};
 use crate::scene::Aabb;
@@ -13,9 +13,10 @@ use glam::DVec3;
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct MdiParams {
     counts: [u32; 4],
+    options: [u32; 4],
     origin: [f32; 4],
     views: [LightView; MAX_LIGHT_VIEWS],
-    buckets: [[f32; 4]; MAX_LIGHT_VIEWS],
+    places: [[f32; 4]; MAX_LIGHT_VIEWS],
     nearest: [[f32; 4]; MAX_LIGHT_VIEWS],
 }
 
@@ -33,6 +34,8 @@ const MOST_RATIO: f64 = 8.0;
 #[derive(Clone, Debug)]
 pub(super) struct MdiViews {
     pub count: u32,
+    /// Texels across and down each view's image.
+    pub side: u32,
     pub params: MdiParams,
     pub rays: Vec<Ray>,
     /// Depths that the lists have room for.
@@ -52,7 +55,7 @@ pub(super) fn mdi_views(
     receivers: &[Vec<DVec3>],
     casters: &[Aabb],
     triangles: u32,
-    options: &MdiOptions,
+    (options, size): (&MdiOptions, u32),
 ) -> MdiViews {
     let around = casters.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
     let sun = light.shape.is_sun();
@@ -70,14 +73,19 @@ pub(super) fn mdi_views(
     };
     let views = light_views(light, receivers, &around, margin);
     let count = views.views.len() as u32;
-    let size = options.resolution;
     let capacity = options.depths * size * size * count.max(1);
     let origin = if sun { DVec3::ZERO } else { center };
     let mut params = MdiParams {
         counts: [count, size, capacity, triangles],
+        options: [
+            options.buckets,
+            u32::from(options.nearest),
+            options.rays,
+            u32::from(options.random) | u32::from(options.footprint == Footprint::Pixel) << 1,
+        ],
         origin: origin.as_vec3().extend(0.0).to_array(),
         views: [LightView::default(); MAX_LIGHT_VIEWS],
-        buckets: [[0.0; 4]; MAX_LIGHT_VIEWS],
+        places: [[0.0; 4]; MAX_LIGHT_VIEWS],
         nearest: [[0.0; 4]; MAX_LIGHT_VIEWS],
     };
     for (index, view) in views.views.iter().enumerate() {
@@ -104,21 +112,30 @@ pub(super) fn mdi_views(
         let (near, far) = (near - if sun { pad } else { 0.0 }, far + pad);
         // Buckets of equal 1 / (depth + shift): the nearest would be too thin without the shift.
         let shift = ((far - MOST_RATIO * near) / (MOST_RATIO - 1.0)).max(0.0);
-        let scaled = |z: f64| match options.spacing {
-            Buckets::Reciprocal if !sun => -1.0 / (z + shift),
-            _ => z,
-        };
-        let (first, last) = (scaled(near), scaled(far));
         // Of nearest boundaries the last one is at the far end.
-        let intervals = options.buckets - u32::from(options.nearest);
-        let width = (last - first) / f64::from(intervals);
-        params.buckets[index] = [first, 1.0 / width, width, shift].map(|v| v as f32);
+        let intervals = f64::from(options.buckets - u32::from(options.nearest));
+        // place = (x + y s) / (z + w s), with s = 1 / depth, of a sun -depth.
+        let places = match options.spacing {
+            _ if sun => {
+                let part = intervals / (far - near);
+                [-part * near, -part, 1.0, 0.0]
+            }
+            Buckets::Uniform => [1.0, -near, 0.0, (far - near) / intervals],
+            Buckets::Reciprocal => {
+                // 1 - (near + shift) / (z + shift) = (1 - near s) / (1 + shift s), 1 at the far end
+                // after this.
+                let part = intervals * (far + shift) / (far - near);
+                [part, -part * near, 1.0, shift]
+            }
+        };
+        params.places[index] = places.map(|v| v as f32);
         params.nearest[index] = [cut.max(-1.0e30) as f32, 0.0, 0.0, 0.0];
     }
     let mut rays = ray_table(&light.shape, options.rays);
     rays.resize(MOST_RAYS, [0.0; 4]);
     MdiViews {
         count,
+        side: size,
         params,
         rays,
         capacity,

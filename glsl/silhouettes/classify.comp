@@ -110,7 +110,7 @@ bool is_silhouette(uint index) {
                 high = max(high, other);
             }
             place += 1u;
-        } while (more.w != 0u);
+        } while ((more.w & 1u) != 0u);
     }
     return low * high > -0.5;
 }

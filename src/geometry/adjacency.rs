@@ -24,8 +24,8 @@ pub(super) struct Adjacency {
     pub points: Vec<[f32; 4]>,
     /// First [`edge_count`](Self::edge_count) edges: both ends, then the corners opposite of the
     /// edge in its faces. The last is [`NO_POINT`] for an open edge. For an edge of three or more
-    /// faces it is [`MORE_FACES`] plus the place in this list of further texels: three corners, and
-    /// 1 if another texel follows, else 0; corners repeat to fill it.
+    /// faces it is [`MORE_FACES`] plus the place in this list of further texels: up to three
+    /// corners, repeated to fill it, and twice their number plus 1 if another texel follows.
     pub edges: Vec<[u32; 4]>,
     /// Number of edges.
     pub edge_count: usize,
@@ -87,7 +87,8 @@ impl Adjacency {
                     let count = texels.len();
                     more.extend(texels.enumerate().map(|(i, texel)| {
                         let at = |i: usize| texel[i.min(texel.len() - 1)];
-                        [at(0), at(1), at(2), u32::from(i + 1 < count)]
+                        let follows = u32::from(i + 1 < count);
+                        [at(0), at(1), at(2), 2 * texel.len() as u32 + follows]
                     }));
                     MORE_FACES | place as u32
                 }
@@ -185,7 +186,7 @@ mod tests {
         let [a, b, first, last] = found.edges[0];
         assert_eq!((a, b, first), (0, 1, 2));
         assert_eq!(last, MORE_FACES | 16);
-        assert_eq!(found.edges[16..], [[3, 4, 5, 1], [6, 7, 7, 0]]);
+        assert_eq!(found.edges[16..], [[3, 4, 5, 7], [6, 7, 7, 4]]);
         assert_eq!(found.points[8][3], 1.0, "another part");
     }
 

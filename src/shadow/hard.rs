@@ -10,11 +10,11 @@
 
 use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
 use super::map::{MAP_SIZE, ShadowMap, add_maps};
-use super::receivers::add_receivers;
+use super::receivers::add_receivers_in;
 use super::{ShadowInputs, ShadowMask};
 use crate::geometry::{DrawTarget, PixelCamera};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, BufferDesc, Graph, PassKind, Stage};
+use crate::graph::{Access, Bind, BufferDesc, Graph, ImageId, PassKind, Stage};
 use bytemuck::{Pod, Zeroable};
 
 /// Uniform block of `hard/visibility.comp`.
@@ -32,6 +32,18 @@ pub struct HardParams {
 }
 
 pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -> ShadowMask {
+    let image = format!("visibility {}", inputs.light_name);
+    ShadowMask::new(add_hard(graph, inputs, "hard", image))
+}
+
+/// Declares the passes under another technique's name; returns the R32F image, of the given name, of
+/// what sees the light's centre: 1 or 0.
+pub(super) fn add_hard<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    technique: &str,
+    image: String,
+) -> ImageId {
     let name = &inputs.light_name;
     let light = inputs.light;
     let scene = inputs.scene;
@@ -51,17 +63,17 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
     params.views[..views.views.len()].copy_from_slice(&views.views);
 
     let buffer = graph.create_buffer(
-        format!("hard.params {name}"),
+        format!("{technique}.params {name}"),
         BufferDesc {
             size: size_of::<HardParams>() as u64,
         },
     );
-    let mut pass = graph.pass(format!("hard.params {name}"), PassKind::Transfer);
+    let mut pass = graph.pass(format!("{technique}.params {name}"), PassKind::Transfer);
     let buffer = pass.overwrite(buffer, Access::Clear);
     pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
 
-    let maps = add_maps(graph, inputs, "hard", &views, DrawTarget::Ids);
-    let receivers = add_receivers(graph, inputs, "hard", 0.0);
+    let maps = add_maps(graph, inputs, technique, &views, DrawTarget::Ids);
+    let receivers = add_receivers_in(graph, inputs, technique, 0.0, image);
     let ShadowMap {
         depth: map_depth,
         ids: Some(map_ids),
@@ -73,7 +85,7 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
     let nearest = SamplerDesc::nearest();
     let compute = Access::Sampled(Stage::Compute);
     let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
-    let mut pass = graph.pass(format!("hard.visibility {name}"), PassKind::Compute);
+    let mut pass = graph.pass(format!("{technique}.visibility {name}"), PassKind::Compute);
     pass.read(buffer, Access::Uniform(Stage::Compute));
     for image in [gbuffer.view_depth, gbuffer.geometric_normal, gbuffer.ids] {
         pass.read(image, compute);
@@ -113,5 +125,5 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
         ctx.bind_compute(&pipeline, &bindings, &[])?;
         list.dispatch(ctx)
     });
-    ShadowMask::new(visibility)
+    visibility
 }

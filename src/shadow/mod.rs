@@ -1,5 +1,6 @@
 //! Shadow techniques under one interface.
 
+pub mod dbuffer;
 pub mod hard;
 mod light_params;
 mod light_view;

@@ -34,6 +34,18 @@ pub(super) fn add_receivers(
     technique: &str,
     reach_m: f32,
 ) -> Receivers {
+    let image = format!("visibility {}", inputs.light_name);
+    add_receivers_in(graph, inputs, technique, reach_m, image)
+}
+
+/// As [`add_receivers`], with the name of the image.
+pub(super) fn add_receivers_in(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    technique: &str,
+    reach_m: f32,
+    image: String,
+) -> Receivers {
     let name = &inputs.light_name;
     let size = inputs.camera.size();
     let [width, height] = size;
@@ -44,7 +56,7 @@ pub(super) fn add_receivers(
     pass.record(move |ctx| cleared.record_clear(ctx));
 
     let desc = ImageDesc::new(vk::Format::R32_SFLOAT, width, height);
-    let visibility = graph.create_image(format!("visibility {name}"), desc);
+    let visibility = graph.create_image(image, desc);
     let tile_bounds = inputs.tile_bounds;
     let (params, part) = inputs.view_params;
     let mut pass = graph.pass(format!("{technique}.tiles {name}"), PassKind::Compute);

@@ -2,6 +2,7 @@
 //!
 //! A new technique adds its module, one variant here with its arms, and its folder of shaders.
 
+use super::dbuffer::{self, DbufferOptions};
 use super::mdi::{self, MdiOptions};
 use super::occlusion_textures::{self, OcclusionOptions};
 use super::oess::{self, OessOptions};
@@ -30,6 +31,8 @@ pub enum Technique {
     Oess(OessOptions),
     /// Silhouette edges near a surface's place in the light's image, which hide a part of the light.
     Ssoc(SsocOptions),
+    /// Silhouette edges of the whole light, each hiding what is beyond it.
+    Dbuffer(DbufferOptions),
     /// Masks of light samples, from lists of the triangles between each tile and the light.
     ShaftMasks(ShaftOptions),
 }
@@ -139,6 +142,7 @@ impl Technique {
         Self::Mdi(MdiOptions::DEFAULT),
         Self::Oess(OessOptions::DEFAULT),
         Self::Ssoc(SsocOptions::DEFAULT),
+        Self::Dbuffer(DbufferOptions::DEFAULT),
         Self::ShaftMasks(ShaftOptions::DEFAULT),
     ];
 
@@ -152,6 +156,7 @@ impl Technique {
             Self::Mdi(_) => mdi::NAME,
             Self::Oess(_) => oess::NAME,
             Self::Ssoc(_) => ssoc::NAME,
+            Self::Dbuffer(_) => dbuffer::NAME,
             Self::ShaftMasks(_) => shaft_masks::NAME,
         }
     }
@@ -175,6 +180,9 @@ impl Technique {
             }
             Self::Oess(_) => {
                 "edges seen from both ends of a line light, which hide a part of it from each surface"
+            }
+            Self::Dbuffer(_) => {
+                "silhouette edges of the whole light, each hiding what is beyond it from each surface"
             }
             Self::ShaftMasks(_) => {
                 "light samples that the triangles between each tile and the light hide, exactly"
@@ -203,6 +211,10 @@ impl Technique {
                 "Q. Mo, V. Popescu, C. Wyman: The Soft Shadow Occlusion Camera. Pacific Graphics 2007"
             }
             Self::Oess(_) => "C. L. Reimann, B. Dreier: Occluding Edges Soft Shadows",
+            Self::Dbuffer(_) => {
+                "B. Jakobsen, N. J. Christensen, B. D. Larsen, K. S. Petersen: Boundary Correct \
+                 Real-Time Soft Shadows. Computer Graphics International 2004"
+            }
             Self::ShaftMasks(_) => return None,
         })
     }
@@ -216,6 +228,7 @@ impl Technique {
             Self::OcclusionTextures(_) => occlusion_textures::SHAPES,
             Self::Oess(_) => oess::SHAPES,
             Self::Ssoc(_) => ssoc::SHAPES,
+            Self::Dbuffer(_) => dbuffer::SHAPES,
         }
     }
 
@@ -229,6 +242,7 @@ impl Technique {
             Self::Mdi(_) => MdiOptions::ALL,
             Self::Oess(_) => OessOptions::ALL,
             Self::Ssoc(_) => SsocOptions::ALL,
+            Self::Dbuffer(_) => DbufferOptions::ALL,
             Self::ShaftMasks(_) => ShaftOptions::ALL,
         }
     }
@@ -244,6 +258,7 @@ impl Technique {
             Self::Mdi(o) => o.values(),
             Self::Oess(o) => o.values(),
             Self::Ssoc(o) => o.values(),
+            Self::Dbuffer(o) => o.values(),
             Self::ShaftMasks(o) => o.values(),
         };
         let names = self.options().iter().map(|option| option.name);
@@ -258,6 +273,7 @@ impl Technique {
             (Self::Mdi(o), _) => o.set(option, value)?,
             (Self::Oess(o), _) => o.set(option, value)?,
             (Self::Ssoc(o), _) => o.set(option, value)?,
+            (Self::Dbuffer(o), _) => o.set(option, value)?,
             (Self::ShaftMasks(o), _) => o.set(option, value)?,
             (Self::Pcf(o) | Self::Pcss(o), "taps") => o.taps = count()?,
             (Self::Pcss(o), "search") => o.search = count()?,
@@ -310,6 +326,7 @@ impl Technique {
             Self::Mdi(options) => mdi::add_passes(graph, inputs, options),
             Self::Oess(options) => oess::add_passes(graph, inputs, options),
             Self::Ssoc(options) => ssoc::add_passes(graph, inputs, options),
+            Self::Dbuffer(options) => dbuffer::add_passes(graph, inputs, options),
             Self::ShaftMasks(options) => shaft_masks::add_passes(graph, inputs, options),
             Self::Pcf(options) | Self::Pcss(options) => {
                 pcss::add_passes(graph, inputs, self.name(), options)

@@ -143,7 +143,7 @@ pub(super) fn add_passes<'f>(
     }
     let buffer = add_params(graph, inputs, params);
     let receivers = add_receivers(graph, inputs, NAME, reach(&inputs.light.shape));
-    let shafts = add_shafts(graph, inputs, buffer, &receivers);
+    let shafts = add_shafts(graph, inputs, NAME, buffer, &receivers);
     let (lists, visibility) = add_lists(graph, inputs, buffer, &receivers, shafts, sizes);
     let masks = masks::Masks {
         options,
@@ -175,9 +175,12 @@ fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: ShaftPar
     buffer
 }
 
-fn add_shafts(
+/// Declares the pass that finds the shaft of each listed tile. `params`: a uniform buffer of the size
+/// of [`ShaftParams`] that begins with the width and height of the picture.
+pub(super) fn add_shafts(
     graph: &mut Graph<'_>,
     inputs: &ShadowInputs<'_>,
+    technique: &str,
     params: BufferId,
     receivers: &Receivers,
 ) -> ImageId {
@@ -185,12 +188,12 @@ fn add_shafts(
     let [across, down] = tile_counts(inputs.camera.size());
     let format = vk::Format::R32G32B32A32_SFLOAT;
     let desc = ImageDesc::new(format, across * SHAFT_TEXELS, down);
-    let shafts = graph.create_image(format!("{NAME}.shafts {name}"), desc);
+    let shafts = graph.create_image(format!("{technique}.shafts {name}"), desc);
     let (gbuffer, triangles) = (inputs.gbuffer, inputs.ids.triangles);
     let (view_params, part) = inputs.view_params;
     let tiles = receivers.list;
     let shape = shape_number(&inputs.light.shape);
-    let mut pass = graph.pass(format!("{NAME}.shafts {name}"), PassKind::Compute);
+    let mut pass = graph.pass(format!("{technique}.shafts {name}"), PassKind::Compute);
     pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
     pass.read(params, Access::Uniform(Stage::Compute));
     for image in [gbuffer.view_depth, gbuffer.ids, triangles] {

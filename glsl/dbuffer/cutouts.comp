@@ -1,0 +1,111 @@
+#version 460
+// Lists, for each tile, the triangles with holes that its shaft meets.
+
+#include "common/hierarchy.glsl"
+#include "common/materials.glsl"
+#include "common/tiles.glsl"
+#include "dbuffer/lists.glsl"
+#include "dbuffer/params.glsl"
+#include "shaft_masks/shaft.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(set = 0, binding = 0, std140) uniform Block {
+    DbufferParams params;
+};
+layout(set = 0, binding = 1, std140) uniform Arguments {
+    TileArguments arguments;
+};
+layout(set = 0, binding = 2) uniform usampler2D list;
+layout(set = 0, binding = 3) uniform sampler2D shafts;
+layout(set = 0, binding = 4) uniform sampler2D triangles;
+layout(set = 0, binding = 5) uniform sampler2D hierarchy;
+layout(set = 0, binding = 6, std430) buffer Pool {
+    uint chunks_used;
+};
+layout(set = 0, binding = 7, r32ui) uniform writeonly uimage2D pool;
+layout(set = 0, binding = 8, rgba32ui) uniform writeonly uimage2D lists;
+
+// A software driver may end loops after 65,535 turns of all lanes of a vector together: a walk ends
+// itself before, and the visibility takes it up where it ended.
+const uint MOST_STEPS = 24576u;
+
+vec4 fetch_triangle_texel(uint texel) {
+    return texelFetch(triangles, triangle_texel_place(texel), 0);
+}
+
+vec4 fetch_node_texel(ivec2 place) {
+    return texelFetch(hierarchy, place, 0);
+}
+
+vec4 fetch_shaft_texel(ivec2 place) {
+    return texelFetch(shafts, place, 0);
+}
+
+// No texture is looked at here.
+vec4 fetch_material_texel(ivec2 place) {
+    return vec4(0.0);
+}
+
+vec4 fetch_uv_texel(ivec2 place) {
+    return vec4(0.0);
+}
+
+vec4 fetch_texture_texel(ivec2 place) {
+    return vec4(0.0);
+}
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= arguments.count) {
+        return;
+    }
+    uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
+    uint tile = texelFetch(list, tile_entry_place(index, tiles), 0).x;
+    Shaft shaft = fetch_shaft(tile_of_entry(tile, tiles));
+    uint nodes = params.counts.z;
+    uint first_chunk = 0u;
+    uint count = 0u;
+    uint resume = nodes;
+    uint chunk = 0u;
+    uint slot = CHUNK;
+    uint node = 0u;
+    uint steps = 0u;
+    while (node < resume) {
+        steps += 1u;
+        vec4 low = fetch_node_low(node);
+        uint next = node + 1u;
+        if (low.w < 0.0) {
+            next = shaft_meets_box(shaft, low.xyz, fetch_node_high(node)) ? next : uint(-low.w);
+        } else if (material_is_masked(fetch_triangle_texel(4u * uint(low.w) + 3u).w)) {
+            uint triangle = uint(low.w);
+            vec3 a = fetch_triangle_texel(4u * triangle).xyz;
+            vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
+            vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
+            if (shaft_meets_triangle(shaft, a, b, c)) {
+                if (slot == CHUNK) {
+                    uint fresh = atomicAdd(chunks_used, 1u);
+                    if (fresh >= params.counts.w) {
+                        resume = node;
+                    } else if (count == 0u) {
+                        first_chunk = fresh;
+                    } else {
+                        imageStore(pool, chunk_entry_place(chunk, CHUNK), uvec4(fresh));
+                    }
+                    chunk = fresh;
+                    slot = 0u;
+                }
+                if (resume == nodes) {
+                    imageStore(pool, chunk_entry_place(chunk, slot), uvec4(triangle));
+                    slot += 1u;
+                    count += 1u;
+                }
+            }
+        }
+        node = next;
+        resume = steps == MOST_STEPS ? min(resume, node) : resume;
+    }
+    // After the lists of silhouettes.
+    ivec2 place = list_place(params.sizes.x, tile, tiles.x * tiles.y);
+    imageStore(lists, place, uvec4(first_chunk, count, resume, nodes));
+}

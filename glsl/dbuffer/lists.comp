@@ -1,0 +1,116 @@
+#version 460
+// Lists, for each tile, the silhouettes of a block that its shaft meets: those that may hide a part of
+// the light from one of its surfaces.
+
+#include "common/tiles.glsl"
+#include "dbuffer/lists.glsl"
+#include "dbuffer/params.glsl"
+#include "shaft_masks/shaft.glsl"
+#include "silhouettes/edges.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(set = 0, binding = 0, std140) uniform Block {
+    DbufferParams params;
+};
+layout(set = 0, binding = 1, std140) uniform Arguments {
+    TileArguments arguments;
+};
+layout(set = 0, binding = 2) uniform usampler2D list;
+layout(set = 0, binding = 3) uniform sampler2D shafts;
+layout(set = 0, binding = 4, std140) uniform Silhouettes {
+    SilhouetteArguments silhouettes;
+};
+layout(set = 0, binding = 5) uniform usampler2D numbers;
+layout(set = 0, binding = 6) uniform usampler2D edges;
+layout(set = 0, binding = 7) uniform sampler2D points;
+layout(set = 0, binding = 8) uniform sampler2D boxes;
+layout(set = 0, binding = 9) uniform sampler2D large_boxes;
+layout(set = 0, binding = 10) uniform sampler2D block_boxes;
+layout(set = 0, binding = 11, std430) buffer Pool {
+    uint chunks_used;
+};
+layout(set = 0, binding = 12, r32ui) uniform writeonly uimage2D pool;
+layout(set = 0, binding = 13, rgba32ui) uniform writeonly uimage2D lists;
+
+uvec4 fetch_edge_texel(ivec2 place) {
+    return texelFetch(edges, place, 0);
+}
+
+vec4 fetch_point_texel(ivec2 place) {
+    return texelFetch(points, place, 0);
+}
+
+vec4 fetch_triangle_texel(uint texel) {
+    return vec4(0.0); // none is needed here
+}
+
+vec4 fetch_node_texel(ivec2 place) {
+    return vec4(0.0); // nor any node
+}
+
+vec4 fetch_shaft_texel(ivec2 place) {
+    return texelFetch(shafts, place, 0);
+}
+
+bool meets(Shaft shaft, sampler2D from, uint box) {
+    vec3 low = texelFetch(from, triangle_texel_place(2u * box), 0).xyz;
+    vec3 high = texelFetch(from, triangle_texel_place(2u * box + 1u), 0).xyz;
+    return shaft_meets_box(shaft, low, high);
+}
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    uint block = gl_WorkGroupID.y;
+    if (index >= arguments.count) {
+        return;
+    }
+    uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
+    uint tile = texelFetch(list, tile_entry_place(index, tiles), 0).x;
+    Shaft shaft = fetch_shaft(tile_of_entry(tile, tiles));
+
+    uint at = block * BLOCK;
+    uint end = max(min(at + BLOCK, silhouettes.count), at);
+    uint first_chunk = 0u;
+    uint count = 0u;
+    uint resume = end;
+    uint chunk = 0u;
+    uint slot = CHUNK;
+    while (at < end) {
+        uint step = 1u;
+        if (at % BLOCK == 0u && !meets(shaft, block_boxes, at / BLOCK)) {
+            step = BLOCK;
+        } else if (at % LARGE_GROUP == 0u && !meets(shaft, large_boxes, at / LARGE_GROUP)) {
+            step = LARGE_GROUP;
+        } else if (at % GROUP == 0u && !meets(shaft, boxes, at / GROUP)) {
+            step = GROUP;
+        } else {
+            uint number = texelFetch(numbers, triangle_texel_place(at), 0).x;
+            uvec4 edge = fetch_edge(number);
+            vec3 a = fetch_point(edge.x).xyz;
+            vec3 b = fetch_point(edge.y).xyz;
+            if (shaft_meets_triangle(shaft, a, b, b)) {
+                if (slot == CHUNK) {
+                    uint fresh = atomicAdd(chunks_used, 1u);
+                    if (fresh >= params.counts.w) {
+                        resume = at;
+                        step = BLOCK;
+                    } else if (count == 0u) {
+                        first_chunk = fresh;
+                    } else {
+                        imageStore(pool, chunk_entry_place(chunk, CHUNK), uvec4(fresh));
+                    }
+                    chunk = fresh;
+                    slot = 0u;
+                }
+                if (step == 1u) {
+                    imageStore(pool, chunk_entry_place(chunk, slot), uvec4(number));
+                    slot += 1u;
+                    count += 1u;
+                }
+            }
+        }
+        at += step;
+    }
+    imageStore(lists, list_place(block, tile, tiles.x * tiles.y), uvec4(first_chunk, count, resume, end));
+}

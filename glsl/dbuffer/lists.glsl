@@ -1,0 +1,38 @@
+// Silhouettes in groups with boxes around them, and lists of those that tiles have to look at.
+//
+// The list of silhouettes is ordered as the mesh is, so that neighbours in it are mostly neighbours in
+// space: 16 of them have a box, 16 such groups another, and so have 16 of these, a block. No tree is
+// built.
+//
+// A tile has a list for each block, and one of triangles with holes where the scene has any: chunks of a
+// pool, linked, so that a list may have any length. Where the pool is used up, a list says from which
+// silhouette or node of the hierarchy on it does not know.
+#ifndef ANTUMBRA_DBUFFER_LISTS_GLSL
+#define ANTUMBRA_DBUFFER_LISTS_GLSL
+
+#include "common/triangles.glsl"
+
+const uint GROUP = 16u;
+const uint LARGE_GROUP = 256u;
+const uint BLOCK = 4096u;
+
+// Entries of a chunk; the one after them is the number of the list's next chunk.
+const uint CHUNK = 31u;
+
+ivec2 chunk_entry_place(uint chunk, uint entry) {
+    return triangle_texel_place(chunk * (CHUNK + 1u) + entry);
+}
+
+// Place of a tile's list: first chunk, number of entries, what it does not know from
+// on, and up to where.
+ivec2 list_place(uint block, uint tile, uint tiles) {
+    return triangle_texel_place(block * tiles + tile);
+}
+
+// What follows the arguments of the draw in the buffer of silhouettes.
+struct SilhouetteArguments {
+    uvec4 draw;
+    uint count;
+};
+
+#endif

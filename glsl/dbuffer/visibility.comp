@@ -1,0 +1,258 @@
+#version 460
+// Visibility of the listed tiles.
+
+#include "common/light_above.glsl"
+#include "common/tiles.glsl"
+#include "common/view_params.glsl"
+#include "dbuffer/lists.glsl"
+#include "dbuffer/params.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(set = 0, binding = 0, std140) uniform View {
+    ViewParams view;
+};
+layout(set = 0, binding = 1, std140) uniform Block {
+    DbufferParams params;
+};
+layout(set = 0, binding = 2) uniform sampler2D view_depth;
+layout(set = 0, binding = 3) uniform usampler2D ids;
+layout(set = 0, binding = 4) uniform sampler2D triangles;
+layout(set = 0, binding = 5) uniform sampler2D hierarchy;
+layout(set = 0, binding = 6) uniform sampler2D materials;
+layout(set = 0, binding = 7) uniform sampler2D uvs;
+layout(set = 0, binding = 8) uniform sampler2D texels;
+layout(set = 0, binding = 9) uniform usampler2D edges;
+layout(set = 0, binding = 10) uniform sampler2D points;
+layout(set = 0, binding = 11) uniform usampler2D numbers;
+layout(set = 0, binding = 12) uniform usampler2D pool;
+layout(set = 0, binding = 13) uniform usampler2D lists;
+layout(set = 0, binding = 14) uniform sampler2D hard;
+layout(set = 0, binding = 15, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 16, std140) uniform Arguments {
+    TileArguments arguments;
+};
+layout(set = 0, binding = 17) uniform usampler2D list;
+
+// 1 where triangles of the scene may have holes.
+layout(constant_id = 2) const uint MASKED = 0u;
+
+#include "dbuffer/coverage.glsl"
+#include "dbuffer/cutouts.glsl"
+#include "dbuffer/ray.glsl"
+
+vec4 fetch_triangle_texel(uint texel) {
+    return texelFetch(triangles, triangle_texel_place(texel), 0);
+}
+
+vec4 fetch_node_texel(ivec2 place) {
+    return texelFetch(hierarchy, place, 0);
+}
+
+vec4 fetch_material_texel(ivec2 place) {
+    return texelFetch(materials, place, 0);
+}
+
+vec4 fetch_uv_texel(ivec2 place) {
+    return texelFetch(uvs, place, 0);
+}
+
+vec4 fetch_texture_texel(ivec2 place) {
+    return texelFetch(texels, place, 0);
+}
+
+uvec4 fetch_edge_texel(ivec2 place) {
+    return texelFetch(edges, place, 0);
+}
+
+vec4 fetch_point_texel(ivec2 place) {
+    return texelFetch(points, place, 0);
+}
+
+// What positions are rounded by, as a part of the largest coordinate: a few units of the last place.
+const float POSITION_ROUNDING = 1.0 / 2097152.0;
+
+// Layers along the light in which the estimate below holds on to the edges' own number.
+const float FEW = 1.0e-5;
+
+// 1 where a sample is above the receiver's plane.
+vec4 above_plane(vec3 horizon, uint i) {
+    vec4 height = horizon.x * params.samples[2u * i] + horizon.y * params.samples[2u * i + 1u] + horizon.z;
+    return vec4(greaterThan(height, vec4(0.0)));
+}
+
+// All of a tile's edges.
+void add_edges(uint tile, uint tiles, CoverageReceiver r, inout Coverage found) {
+    for (uint block = 0u; block < params.sizes.x; ++block) {
+        uvec4 stored = texelFetch(lists, list_place(block, tile, tiles), 0);
+        uint chunk = stored.x;
+        uint slot = 0u;
+        uint rest = stored.y;
+        uint missing = stored.z;
+        while (rest > 0u || missing < stored.w) {
+            uint number;
+            if (rest > 0u) {
+                if (slot == CHUNK) {
+                    chunk = texelFetch(pool, chunk_entry_place(chunk, CHUNK), 0).x;
+                    slot = 0u;
+                }
+                number = texelFetch(pool, chunk_entry_place(chunk, slot), 0).x;
+                slot += 1u;
+                rest -= 1u;
+            } else {
+                number = texelFetch(numbers, triangle_texel_place(missing), 0).x;
+                missing += 1u;
+            }
+            add_edge(r, number, found);
+        }
+    }
+}
+
+// All of a tile's triangles with holes.
+void add_cutouts(uint tile, uint tiles, CoverageReceiver r, inout vec4 cut_out[FOURS]) {
+    uvec4 stored = texelFetch(lists, list_place(params.sizes.x, tile, tiles), 0);
+    uint chunk = stored.x;
+    uint slot = 0u;
+    uint rest = stored.y;
+    uint node = stored.z;
+    while (rest > 0u || node < stored.w) {
+        uint triangle = 0u;
+        bool found = rest > 0u;
+        if (found) {
+            if (slot == CHUNK) {
+                chunk = texelFetch(pool, chunk_entry_place(chunk, CHUNK), 0).x;
+                slot = 0u;
+            }
+            triangle = texelFetch(pool, chunk_entry_place(chunk, slot), 0).x;
+            slot += 1u;
+            rest -= 1u;
+        } else {
+            float leaf = fetch_node_low(node).w;
+            triangle = uint(max(leaf, 0.0));
+            found = leaf >= 0.0 && material_is_masked(fetch_triangle_texel(4u * triangle + 3u).w);
+            node += 1u;
+        }
+        if (found) {
+            add_cutout(r, triangle, cut_out);
+        }
+    }
+}
+
+float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
+    float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+    uint id = texelFetch(ids, ivec2(pixel), 0).x;
+    vec3 ray = pixel_ray(view.camera, pixel);
+    vec3 p = view.camera.eye.xyz + depth * ray;
+    vec3 n = fetch_geometric_normal(max(id, 1u) - 1u);
+    n = dot(n, ray) > 0.0 ? -n : n;
+    bool sun = LIGHT_SHAPE == LIGHT_SUN;
+    float above = id == 0u ? 0.0 : light_above(view.light, LIGHT_SHAPE, p, n);
+    bool behind = (LIGHT_SHAPE == LIGHT_DISK || LIGHT_SHAPE == LIGHT_RECT)
+        && dot(light_offset(view.light, p), view.light.direction.xyz) >= 0.0;
+    if (above <= 0.0 || behind) {
+        return id == 0u ? 1.0 : (above <= 0.0 ? 0.0 : texelFetch(hard, ivec2(pixel), 0).x);
+    }
+    vec3 extent = max(abs(p), sun ? vec3(0.0) : abs(view.light.center.xyz));
+    float rounding_m = POSITION_ROUNDING * max(extent.x, max(extent.y, extent.z));
+    CoverageReceiver r = coverage_receiver(view.light, p, n, rounding_m);
+    vec3 horizon = vec3(dot(n, r.axis_u), dot(n, r.axis_v), dot(n, r.center));
+    bool whole = above >= 1.0;
+    bool center_above = horizon.z > 0.0;
+    if (!center_above) {
+        // The highest point of the light.
+        vec2 up = horizon.xy / max(length(horizon.xy), 1.0e-37);
+        r.from = LIGHT_SHAPE == LIGHT_RECT ? sign(up) : up;
+    }
+
+    Coverage found;
+    for (uint i = 0u; i < FOURS; ++i) {
+        found.layers[i] = vec4(0.0);
+    }
+    found.integral = 0.0;
+    found.most = 0.0;
+    found.lighter = 0.0;
+    found.fewer = 0.0;
+    found.beyond = vec2(0.0);
+    add_edges(tile, tiles, r, found);
+
+    // The sample with the fewest layers before it.
+    float fewest = 1.0e9;
+    vec2 target = r.from;
+    for (uint i = 0u; i < FOURS; ++i) {
+        vec4 layers = whole ? found.layers[i] : mix(vec4(1.0e9), found.layers[i], above_plane(horizon, i));
+        for (uint j = 0u; j < 4u; ++j) {
+            bool fewer = layers[j] < fewest;
+            fewest = fewer ? layers[j] : fewest;
+            target = fewer ? vec2(params.samples[2u * i][j], params.samples[2u * i + 1u][j]) : target;
+        }
+    }
+    if (fewest > 0.0) {
+        // It lies between samples.
+        fewest = 0.0;
+        target = r.from;
+    }
+    bool center_seen = center_above && texelFetch(hard, ivec2(pixel), 0).x > 0.0;
+    // A part of the light between samples may have fewer still.
+    bool sliver = whole && !center_seen && fewest == 0.0 && found.lighter > 0.0;
+    fewest = sliver ? -found.fewer : fewest;
+    target = sliver ? found.beyond : target;
+    // Where the centre is seen and nothing has fewer layers, there are none before the centre.
+    bool known = center_seen && fewest == 0.0;
+    if (!known && ray_is_blocked(p, to_light_place(r, target), sun, params.counts.z, rounding_m)) {
+        return 0.0;
+    }
+
+    // Visible are the samples without layers. Where all blockers have the same number of layers and none
+    // is behind another, the part of the light that they hide is proportional to the mean number, which
+    // is known exactly: so the samples' own mean of it, in the proportion that they show, is replaced by
+    // the exact one (a control variate).
+    vec4 cut_out[FOURS];
+    for (uint i = 0u; i < FOURS; ++i) {
+        cut_out[i] = vec4(0.0);
+    }
+    if (MASKED != 0u) {
+        add_cutouts(tile, tiles, r, cut_out);
+    }
+    float weight = 0.0;
+    float hidden = 0.0;
+    float cut_away = 0.0;
+    float mean = 0.0;
+    float square = 0.0;
+    float both = 0.0;
+    for (uint i = 0u; i < FOURS; ++i) {
+        vec4 layers = found.layers[i] - fewest;
+        vec4 is_hidden = vec4(greaterThan(layers, vec4(0.5)));
+        vec4 counts = whole ? vec4(1.0) : above_plane(horizon, i);
+        weight += dot(counts, vec4(1.0));
+        hidden += dot(is_hidden, counts);
+        cut_away += dot(cut_out[i] * (1.0 - is_hidden), counts);
+        mean += dot(layers, counts);
+        square += dot(layers * layers, counts);
+        both += dot(layers * is_hidden, counts);
+    }
+    if (!whole) {
+        return above * (weight > 0.0 ? 1.0 - (hidden + cut_away) / weight : 1.0);
+    }
+    hidden /= weight;
+    mean /= weight;
+    square = square / weight - mean * mean;
+    both = both / weight - mean * hidden;
+    float proportion = found.most > 0.0 ? (both + FEW / found.most) / (max(square, 0.0) + FEW) : 0.0;
+    float exact = found.integral - fewest;
+    return clamp(1.0 - hidden - cut_away / weight - proportion * (exact - mean), 0.0, 1.0);
+}
+
+void main() {
+    uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
+    if (index >= arguments.count) {
+        return;
+    }
+    uvec2 size = params.counts.xy;
+    uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
+    uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
+    uvec2 pixel = tile_of_entry(entry, tiles) * TILE_SIZE + gl_LocalInvocationID.xy;
+    if (any(greaterThanEqual(pixel, size))) {
+        return;
+    }
+    imageStore(visibility, ivec2(pixel), vec4(pixel_visibility(pixel, entry, tiles.x * tiles.y)));
+}

@@ -1,0 +1,297 @@
+//! The passes that find the edges of each tile.
+
+use super::{DbufferOptions, NAME};
+use crate::geometry::{TileList, image_place, tile_counts};
+use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
+use crate::graph::{
+    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
+};
+use crate::shadow::ShadowInputs;
+use crate::shadow::receivers::Receivers;
+use crate::shadow::silhouettes::Silhouettes;
+use ash::vk;
+
+/// Silhouettes of a box of each level, and of a block: `dbuffer/lists.glsl`.
+const GROUPS: [u32; 3] = [16, 256, 4096];
+
+/// Texels of a chunk of a list: `CHUNK` + 1 in `dbuffer/lists.glsl`.
+const CHUNK_TEXELS: u32 = 32;
+
+/// Most chunks of lists: 64 MiB.
+const MOST_CHUNKS: u32 = 1 << 19;
+
+/// Fewest tiles that lists have room for: a small picture's tiles are wide, and so are their shafts.
+const LEAST_TILES: u32 = 1024;
+
+/// Sizes of what the device fills.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sizes {
+    /// Edges of the scene: the most silhouettes that there can be.
+    edges: u32,
+    /// Blocks of silhouettes.
+    pub blocks: u32,
+    /// Lists of a tile: one for each block, and one of triangles with holes if there are any.
+    pub lists: u32,
+    /// Chunks of lists that there is room for.
+    pub chunks: u32,
+}
+
+impl Sizes {
+    pub(super) fn new(inputs: &ShadowInputs<'_>, options: &DbufferOptions) -> Self {
+        let edges = inputs.scene.edge_count() as u32;
+        let [across, down] = tile_counts(inputs.camera.size());
+        let entries = (across * down).max(LEAST_TILES) * options.room;
+        let blocks = edges.div_ceil(GROUPS[2]).max(1);
+        Self {
+            edges,
+            blocks,
+            lists: blocks + u32::from(inputs.scene.has_masks()),
+            chunks: (entries / CHUNK_TEXELS).min(MOST_CHUNKS),
+        }
+    }
+}
+
+/// What the passes work on.
+pub(super) struct Lists {
+    pub params: BufferId,
+    pub silhouettes: Silhouettes,
+    pub receivers: Receivers,
+    pub shafts: ImageId,
+    /// R32F: what sees the light's centre.
+    pub hard: ImageId,
+    pub sizes: Sizes,
+}
+
+/// Lists and what they are made in.
+struct Made {
+    used: BufferId,
+    pool: ImageId,
+    lists: ImageId,
+}
+
+/// What they make.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    /// R32_UINT: chunks of numbers of edges.
+    pub pool: ImageId,
+    /// RGBA32_UINT: `list_place` in `dbuffer/lists.glsl`.
+    pub lists: ImageId,
+    /// Tiles with edges.
+    pub tiles: TileList,
+}
+
+/// An image of so many texels, in rows.
+fn texels(format: vk::Format, count: u32) -> ImageDesc {
+    let [width, height] = image_place(count as usize);
+    ImageDesc::new(format, width, height)
+}
+
+impl Lists {
+    /// Declares the passes; returns the visibility image too, in which all but the found tiles are
+    /// done.
+    pub(super) fn add(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> (Found, ImageId) {
+        let mut boxes: Vec<ImageId> = Vec::new();
+        for level in 0..GROUPS.len() {
+            let below = level
+                .checked_sub(1)
+                .map(|below| (boxes[below], GROUPS[below]));
+            boxes.push(self.add_boxes(graph, inputs, GROUPS[level], below));
+        }
+        let mut made = self.add_lists(graph, inputs, [boxes[0], boxes[1], boxes[2]]);
+        if inputs.scene.has_masks() {
+            made = self.add_cutouts(graph, inputs, made);
+        }
+        let Made { pool, lists, .. } = made;
+        self.add_settle(graph, inputs, pool, lists)
+    }
+
+    fn add_boxes(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        group: u32,
+        below: Option<(ImageId, u32)>,
+    ) -> ImageId {
+        let name = &inputs.light_name;
+        let count = self.sizes.edges.div_ceil(group);
+        let desc = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * count);
+        let boxes = graph.create_image(format!("{NAME}.boxes {name}.{group}"), desc);
+        let (edges, points) = (inputs.ids.edges, inputs.ids.points);
+        let Silhouettes { list, arguments } = self.silhouettes;
+        let (lower, size) = below.unwrap_or((points, 0));
+        let mut pass = graph.pass(format!("{NAME}.boxes {name}.{group}"), PassKind::Compute);
+        pass.read(arguments, Access::Uniform(Stage::Compute));
+        for image in [list, edges, points] {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+        if below.is_some() {
+            pass.read(lower, Access::Sampled(Stage::Compute));
+        }
+        let boxes = pass.overwrite(boxes, Access::StorageWrite(Stage::Compute));
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let bindings = [
+                Bind::uniform(0, arguments),
+                Bind::sampled(1, list, nearest),
+                Bind::sampled(2, edges, nearest),
+                Bind::sampled(3, points, nearest),
+                Bind::sampled(4, lower, nearest),
+                Bind::storage_image(5, boxes),
+            ];
+            let shader = &spirv::DBUFFER_BOXES_COMP;
+            ctx.bind_compute(
+                &ComputePipelineDesc::new(shader),
+                &bindings,
+                bytemuck::bytes_of(&size),
+            )?;
+            ctx.dispatch(shader.groups([count, 1, 1]));
+            Ok(())
+        });
+        boxes
+    }
+
+    fn add_lists(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        boxes: [ImageId; 3],
+    ) -> Made {
+        let name = &inputs.light_name;
+        let [across, down] = tile_counts(inputs.camera.size());
+        let used = graph.create_buffer(format!("{NAME}.used {name}"), BufferDesc { size: 16 });
+        let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
+        let used = pass.overwrite(used, Access::Clear);
+        pass.record(move |ctx| ctx.update_buffer(used, 0, &[0; 16]));
+
+        let pool = texels(vk::Format::R32_UINT, self.sizes.chunks * CHUNK_TEXELS);
+        let pool = graph.create_image(format!("{NAME}.pool {name}"), pool);
+        let blocks = self.sizes.blocks;
+        let desc = texels(
+            vk::Format::R32G32B32A32_UINT,
+            across * down * self.sizes.lists,
+        );
+        let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
+        let (params, shafts, tiles) = (self.params, self.shafts, self.receivers.list);
+        let Silhouettes { list, arguments } = self.silhouettes;
+        let (edges, points) = (inputs.ids.edges, inputs.ids.points);
+        let mut pass = graph.pass(format!("{NAME}.lists {name}"), PassKind::Compute);
+        pass.read(params, Access::Uniform(Stage::Compute));
+        pass.read(arguments, Access::Uniform(Stage::Compute));
+        for image in [shafts, list, edges, points].into_iter().chain(boxes) {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+        tiles.read(&mut pass);
+        let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
+        let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
+        let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let bindings = [
+                Bind::uniform(0, params),
+                Bind::uniform(1, tiles.arguments),
+                Bind::sampled(2, tiles.tiles, nearest),
+                Bind::sampled(3, shafts, nearest),
+                Bind::uniform(4, arguments),
+                Bind::sampled(5, list, nearest),
+                Bind::sampled(6, edges, nearest),
+                Bind::sampled(7, points, nearest),
+                Bind::sampled(8, boxes[0], nearest),
+                Bind::sampled(9, boxes[1], nearest),
+                Bind::sampled(10, boxes[2], nearest),
+                Bind::storage_buffer(11, used),
+                Bind::storage_image(12, pool),
+                Bind::storage_image(13, lists),
+            ];
+            let shader = &spirv::DBUFFER_LISTS_COMP;
+            ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
+            let [groups, ..] = shader.groups([across * down, 1, 1]);
+            ctx.dispatch([groups, blocks, 1]);
+            Ok(())
+        });
+        Made { used, pool, lists }
+    }
+
+    fn add_cutouts(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, made: Made) -> Made {
+        let name = &inputs.light_name;
+        let [across, down] = tile_counts(inputs.camera.size());
+        let (params, shafts, tiles) = (self.params, self.shafts, self.receivers.list);
+        let (triangles, hierarchy) = (inputs.ids.triangles, inputs.ids.hierarchy);
+        let mut pass = graph.pass(format!("{NAME}.cutouts {name}"), PassKind::Compute);
+        pass.read(params, Access::Uniform(Stage::Compute));
+        for image in [shafts, triangles, hierarchy] {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+        tiles.read(&mut pass);
+        let used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
+        let pool = pass.write(made.pool, Access::StorageWrite(Stage::Compute));
+        let lists = pass.write(made.lists, Access::StorageWrite(Stage::Compute));
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let bindings = [
+                Bind::uniform(0, params),
+                Bind::uniform(1, tiles.arguments),
+                Bind::sampled(2, tiles.tiles, nearest),
+                Bind::sampled(3, shafts, nearest),
+                Bind::sampled(4, triangles, nearest),
+                Bind::sampled(5, hierarchy, nearest),
+                Bind::storage_buffer(6, used),
+                Bind::storage_image(7, pool),
+                Bind::storage_image(8, lists),
+            ];
+            let shader = &spirv::DBUFFER_CUTOUTS_COMP;
+            ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
+            ctx.dispatch(shader.groups([across * down, 1, 1]));
+            Ok(())
+        });
+        Made { used, pool, lists }
+    }
+
+    fn add_settle(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        pool: ImageId,
+        lists: ImageId,
+    ) -> (Found, ImageId) {
+        let name = &inputs.light_name;
+        let size = inputs.camera.size();
+        let [across, down] = tile_counts(size);
+        let mut penumbra = TileList::create(graph, &format!("{NAME}.penumbra {name}"), size);
+        let mut pass = graph.pass(format!("{NAME}.penumbra {name}"), PassKind::Transfer);
+        penumbra.clear(&mut pass);
+        let cleared = penumbra;
+        pass.record(move |ctx| cleared.record_clear(ctx));
+
+        let (params, shafts, hard) = (self.params, self.shafts, self.hard);
+        let tiles = self.receivers.list;
+        let mut pass = graph.pass(format!("{NAME}.settle {name}"), PassKind::Compute);
+        pass.read(params, Access::Uniform(Stage::Compute));
+        for image in [shafts, lists, hard] {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+        tiles.read(&mut pass);
+        penumbra.fill(&mut pass);
+        let visibility = self.receivers.visibility;
+        let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let bindings = [
+                Bind::uniform(0, params),
+                Bind::uniform(1, tiles.arguments),
+                Bind::sampled(2, tiles.tiles, nearest),
+                Bind::sampled(3, shafts, nearest),
+                Bind::sampled(4, lists, nearest),
+                Bind::sampled(5, hard, nearest),
+                Bind::storage_buffer(6, penumbra.arguments),
+                Bind::storage_image(7, penumbra.tiles),
+                Bind::storage_image(8, visibility),
+            ];
+            let shader = &spirv::DBUFFER_SETTLE_COMP;
+            ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
+            ctx.dispatch(shader.groups([across * down, 1, 1]));
+            Ok(())
+        });
+        let tiles = penumbra;
+        (Found { pool, lists, tiles }, visibility)
+    }
+}

@@ -1,0 +1,188 @@
+//! Technique `dbuffer`: shadows whose boundaries are right, from the silhouettes of the whole light
+//! (B. Jakobsen, N. J. Christensen, B. D. Larsen, K. S. Petersen: Boundary Correct Real-Time Soft
+//! Shadows, Computer Graphics International 2004).
+//!
+//! As published, an edge is a silhouette if some point of the light sees it as one, so that both the
+//! umbra's and the penumbra's boundary are right, not only the hard shadow of the light's centre.
+//! Published is one edge for each receiver, found in a buffer that is drawn from the light's centre.
+//! Here each tile of the picture lists the edges between its surfaces and the light, and each
+//! receiver takes all of them: every edge hides the part of the light beyond it, exactly, and the
+//! layers before some places of the light tell which parts overlap (`glsl/dbuffer/coverage.glsl`).
+//! So blockers that are concave, smaller than the light or behind each other are right.
+//!
+//! | pass | makes |
+//! |---|---|
+//! | `params` | places on the light |
+//! | `map`, `visibility` of `dbuffer.hard` | what sees the light's centre |
+//! | `silhouettes.*` | the list of edges ([`super::silhouettes`]) |
+//! | `boxes` | boxes around 16, 256 and 4096 of them |
+//! | `start`, `tiles`, `shafts` | tiles that some of the light is above, what is between both |
+//! | `lists` | the edges of each tile |
+//! | `cutouts` | its triangles with holes, if the scene has any: these hide samples of the light |
+//! | `settle` | tiles without edges; a list of the others |
+//! | `visibility` | visibility of the others |
+
+mod lists;
+mod options;
+mod samples;
+
+pub use options::DbufferOptions;
+
+use super::receivers::add_receivers;
+use super::shaft_masks::add_shafts;
+use super::silhouettes::{SilhouetteRule, add_silhouettes};
+use super::{ShadowInputs, ShadowMask, hard, shape_number};
+use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
+use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageId, PassKind, Stage};
+use crate::light::{LightShape, ShapeKind};
+use bytemuck::{Pod, Zeroable};
+use lists::{Lists, Sizes};
+
+/// The technique's name.
+pub(super) const NAME: &str = "dbuffer";
+
+/// Light shapes that it can do.
+pub(super) const SHAPES: &[ShapeKind] = &[
+    ShapeKind::Point,
+    ShapeKind::Disk,
+    ShapeKind::Rect,
+    ShapeKind::Sphere,
+    ShapeKind::Sun,
+];
+
+/// `DbufferParams` in `dbuffer/params.glsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct DbufferParams {
+    counts: [u32; 4],
+    samples: [[f32; 4]; samples::MOST_TEXELS],
+    sizes: [u32; 4],
+}
+
+/// Declares the passes.
+pub(super) fn add_passes<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: DbufferOptions,
+) -> ShadowMask {
+    let name = &inputs.light_name;
+    let shape = inputs.light.shape;
+    if shape == LightShape::Point || inputs.scene.triangle_count() == 0 {
+        let image = format!("visibility {name}");
+        return ShadowMask::new(hard::add_hard(graph, inputs, NAME, image));
+    }
+    let base = format!("{NAME}.hard");
+    let hard = hard::add_hard(graph, inputs, &base, format!("{base} {name}"));
+    let size = inputs.camera.size();
+    let sizes = Sizes::new(inputs, &options);
+    let params = DbufferParams {
+        counts: [
+            size[0],
+            size[1],
+            inputs.scene.node_count() as u32,
+            sizes.chunks,
+        ],
+        samples: samples::texels(options.samples, matches!(shape, LightShape::Rect { .. })),
+        sizes: [sizes.blocks, sizes.lists, 0, 0],
+    };
+    let params = add_params(graph, inputs, params);
+    let silhouettes = add_silhouettes(graph, inputs, NAME, SilhouetteRule::WholeLight, 1);
+    let receivers = add_receivers(graph, inputs, NAME, reach(&shape));
+    let shafts = add_shafts(graph, inputs, NAME, params, &receivers);
+    let tools = Lists {
+        params,
+        silhouettes,
+        receivers,
+        shafts,
+        hard,
+        sizes,
+    };
+    let (found, visibility) = tools.add(graph, inputs);
+    add_visibility(graph, inputs, &options, &tools, &found, visibility)
+}
+
+/// Distance from the light's centre to its farthest point, metres; of a sun at distance 1.
+fn reach(shape: &LightShape) -> f32 {
+    match shape {
+        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
+        shape => shape.bounding_radius(),
+    }
+}
+
+fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: DbufferParams) -> BufferId {
+    let name = &inputs.light_name;
+    let size = size_of::<DbufferParams>() as u64;
+    let buffer = graph.create_buffer(format!("{NAME}.params {name}"), BufferDesc { size });
+    let mut pass = graph.pass(format!("{NAME}.params {name}"), PassKind::Transfer);
+    let buffer = pass.overwrite(buffer, Access::Clear);
+    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
+    buffer
+}
+
+fn add_visibility<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: &DbufferOptions,
+    tools: &Lists,
+    found: &lists::Found,
+    visibility: ImageId,
+) -> ShadowMask {
+    let name = &inputs.light_name;
+    let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
+    let (view_params, part) = inputs.view_params;
+    let (params, hard, numbers) = (tools.params, tools.hard, tools.silhouettes.list);
+    let lists::Found { pool, lists, tiles } = *found;
+    let mut pass = graph.pass(format!("{NAME}.visibility {name}"), PassKind::Compute);
+    pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+    pass.read(params, Access::Uniform(Stage::Compute));
+    let images = [
+        gbuffer.view_depth,
+        gbuffer.ids,
+        ids.triangles,
+        ids.hierarchy,
+        ids.edges,
+        ids.points,
+        numbers,
+        pool,
+        lists,
+        hard,
+    ];
+    for image in images.into_iter().chain(ids.mask_images()) {
+        pass.read(image, Access::Sampled(Stage::Compute));
+    }
+    tiles.read(&mut pass);
+    let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
+    let shape = shape_number(&inputs.light.shape);
+    let masked = u32::from(inputs.scene.has_masks());
+    let fours = options.samples / 4;
+    pass.record(move |ctx| {
+        let nearest = SamplerDesc::nearest();
+        let bindings = [
+            Bind::uniform(0, view_params).part(part),
+            Bind::uniform(1, params),
+            Bind::sampled(2, gbuffer.view_depth, nearest),
+            Bind::sampled(3, gbuffer.ids, nearest),
+            Bind::sampled(4, ids.triangles, nearest),
+            Bind::sampled(5, ids.hierarchy, nearest),
+            Bind::sampled(6, ids.materials, nearest),
+            Bind::sampled(7, ids.triangle_uvs, nearest),
+            Bind::sampled(8, ids.texels, nearest),
+            Bind::sampled(9, ids.edges, nearest),
+            Bind::sampled(10, ids.points, nearest),
+            Bind::sampled(11, numbers, nearest),
+            Bind::sampled(12, pool, nearest),
+            Bind::sampled(13, lists, nearest),
+            Bind::sampled(14, hard, nearest),
+            Bind::storage_image(15, visibility),
+            Bind::uniform(16, tiles.arguments),
+            Bind::sampled(17, tiles.tiles, nearest),
+        ];
+        let pipeline = ComputePipelineDesc {
+            constants: vec![(0, shape), (1, fours), (2, masked)],
+            ..ComputePipelineDesc::new(&spirv::DBUFFER_VISIBILITY_COMP)
+        };
+        ctx.bind_compute(&pipeline, &bindings, &[])?;
+        tiles.dispatch(ctx)
+    });
+    ShadowMask::new(visibility)
+}

@@ -7,7 +7,7 @@
 //! A scene holds one moment: skins and morph targets are applied before, and corners that a seam has
 //! doubled carry the same weights, so they lie at the same position at every moment.
 
-use super::scene_layout::is_cut_out;
+use super::scene_layout::is_solid;
 use crate::scene::Scene;
 use glam::Vec3;
 use std::collections::HashMap;
@@ -32,13 +32,14 @@ pub(super) struct Adjacency {
 }
 
 impl Adjacency {
-    /// Finds the edges of all triangles that block light.
+    /// Finds the edges of all triangles that block light as a whole: where a texture's alpha makes
+    /// holes, the outline is the texture's.
     pub fn new(scene: &Scene) -> Self {
         let mut welded: HashMap<[u32; 3], u32> = HashMap::new();
         let mut positions: Vec<Vec3> = Vec::new();
         let mut halves: Vec<(u64, u32)> = Vec::with_capacity(3 * scene.triangle_count());
         for primitive in &scene.primitives {
-            if is_cut_out(scene, primitive) {
+            if !is_solid(scene, primitive) {
                 continue;
             }
             let mut point = |index: &u32| {
@@ -203,5 +204,15 @@ mod tests {
             ..Material::default()
         });
         assert_eq!(Adjacency::new(&holes).edge_count, 3);
+        // A texture with holes.
+        holes.primitives[1].uvs = vec![glam::Vec2::ZERO; 4];
+        holes.materials[1].base_color = glam::Vec4::ONE;
+        holes.materials[1].base_texture = Some(crate::scene::Texture {
+            image: 0,
+            wrap: [crate::scene::Wrap::Clamp; 2],
+        });
+        assert_eq!(Adjacency::new(&holes).edge_count, 3);
+        holes.materials[1].alpha_mode = crate::scene::AlphaMode::Opaque;
+        assert_eq!(Adjacency::new(&holes).edge_count, 5);
     }
 }

@@ -262,9 +262,10 @@ fn kind_of(scene: &Scene, primitive: &Primitive) -> Option<Kind> {
     }
 }
 
-/// Whether alpha cuts out all of a primitive, so that it blocks nothing.
-pub(super) fn is_cut_out(scene: &Scene, primitive: &Primitive) -> bool {
-    kind_of(scene, primitive).is_none()
+/// Whether a primitive's outline is that of its triangles: not where alpha cuts out all or parts of
+/// it.
+pub(super) fn is_solid(scene: &Scene, primitive: &Primitive) -> bool {
+    !matches!(kind_of(scene, primitive), None | Some(Kind::Masked))
 }
 
 /// Width and height in texels of an image of `IMAGE_WIDTH` that holds a number of things.

@@ -153,7 +153,7 @@ fn reach(light: &AreaLight) -> f32 {
 
 /// Distance from the light to the nearest box with triangles, but not nearer than the light's own
 /// size: a blocker there covers the light from everywhere that the search could tell apart.
-fn nearest_blocker(light: &AreaLight, boxes: impl Iterator<Item = Aabb>) -> f64 {
+pub(super) fn nearest_blocker(light: &AreaLight, boxes: impl Iterator<Item = Aabb>) -> f64 {
     let center = light.center;
     let distance = |b: Aabb| (center.clamp(b.min, b.max) - center).length();
     let nearest = boxes.map(distance).fold(f32::INFINITY, f32::min);

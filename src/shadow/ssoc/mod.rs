@@ -10,12 +10,19 @@
 //! image-space estimate the plane through receiver and edge cuts the light, which is exact for
 //! inclined edges too, and no texel of the map shows along it.
 //!
+//! Published is that the visibilities of up to four edges are joined two by two, which knows too
+//! little of how they lie to each other. By default ([`Combine::Cells`]) the light is cut into cells
+//! instead, and each is decided by the outline nearest to it: the first edge's answer is exact where
+//! its line is the only one, and changes by the cells that other edges cross. Of overlapping bands
+//! the edge wins that comes nearest to hiding the light's centre; published is the nearest in the
+//! image.
+//!
 //! | pass | makes |
 //! |---|---|
 //! | `params` | views |
 //! | `map` | depths seen from the light's centre |
 //! | `silhouettes.*` | the list of edges ([`super::silhouettes`]) |
-//! | `bands` | both distortion maps of a view, side by side |
+//! | `bands` | the outer and the inner distortion map of a view |
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
 
@@ -25,6 +32,7 @@ pub use options::{Combine, SsocOptions};
 
 use super::light_view::{LightView, LightViews, MAX_LIGHT_VIEWS, light_views};
 use super::map::add_maps_of_size;
+use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
 use super::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
 use super::{ShadowInputs, ShadowMask, shape_number};
@@ -54,7 +62,9 @@ pub(super) const SHAPES: &[ShapeKind] = &[
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 struct SsocParams {
     counts: [u32; 4],
+    bands: [u32; 4],
     reach: [f32; 4],
+    search: [f32; 4],
     views: [LightView; MAX_LIGHT_VIEWS],
 }
 
@@ -64,10 +74,11 @@ struct SsocParams {
 struct BandsPush {
     center: [f32; 4],
     view: u32,
+    side: u32,
 }
 
-/// Vertices of an edge's bands: two triangles for its outer side, two for its inner one.
-const VERTICES: u32 = 12;
+/// Vertices of one side of an edge: `VERTICES` in `ssoc/bands.vert`.
+const VERTICES: u32 = 36;
 
 /// Half width of a band in texels, at least: a receiver's texel may lie that far from the edge.
 const LEAST_TEXELS: f32 = 1.5;
@@ -88,6 +99,8 @@ pub(super) fn add_passes<'f>(
     let reach = reach(&light);
     let casters = inputs.scene.bounds();
     let far = farthest(inputs);
+    let boxes = inputs.scene.draws().iter().map(|draw| draw.bounds);
+    let nearest = nearest_blocker(&light, boxes);
     let margin = if light.shape.is_sun() {
         f64::from(reach * casters.radius())
     } else {
@@ -97,11 +110,17 @@ pub(super) fn add_passes<'f>(
     let [width, height] = inputs.camera.size();
     let mut params = SsocParams {
         counts: [views.views.len() as u32, options.resolution, width, height],
+        bands: [options.bands, 0, 0, 0],
         reach: [reach, far, far * NEAR, LEAST_TEXELS],
         ..SsocParams::default()
     };
+    params.search[0] = nearest as f32;
     for (place, view) in params.views.iter_mut().zip(&views.views) {
         *place = *view;
+        if light.shape.is_sun() {
+            // Stored depth 1 is the near end of the view.
+            params.search[0] = (1.0 - view.scale[3]) / view.scale[2];
+        }
     }
     let buffer = add_params(graph, inputs, params);
     let depth = DrawTarget::Depth;
@@ -142,8 +161,8 @@ fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: SsocPara
     buffer
 }
 
-/// The distortion maps: R32_UINT, one more than the number of the edge, 0 for none; the outer map in
-/// the left half, the inner one in the right half, a layer for each view.
+/// The distortion maps: R32_UINT, one more than the number of the edge, 0 for none, and its faces'
+/// side in the highest bit; for each view a layer for the outer and one for the inner map.
 fn add_bands(
     graph: &mut Graph<'_>,
     inputs: &ShadowInputs<'_>,
@@ -158,10 +177,10 @@ fn add_bands(
     let side = if views.views.is_empty() {
         1
     } else {
-        options.resolution
+        options.bands
     };
-    let image = |format| ImageDesc::new(format, 2 * side, side);
-    let numbers = image(vk::Format::R32_UINT).layers(layers);
+    let image = |format| ImageDesc::new(format, side, side);
+    let numbers = image(vk::Format::R32_UINT).layers(2 * layers);
     let mut bands = graph.create_image(format!("{NAME}.bands {name}"), numbers);
     let center = if inputs.light.shape.is_sun() {
         Vec3::ZERO
@@ -169,9 +188,10 @@ fn add_bands(
         inputs.light.center
     };
     let (edges, points) = (inputs.ids.edges, inputs.ids.points);
-    for layer in 0..layers {
+    for layer in 0..2 * layers {
         let part = ImagePart::layer(layer);
-        // Distance to the edge, as a depth: greater is nearer.
+        let seen = ImagePart::layer(layer / 2);
+        // Nearness of the edge, as a depth.
         let apart = image(vk::Format::D32_SFLOAT);
         let apart = graph.create_image(format!("{NAME}.bands_apart {name}.{layer}"), apart);
         let mut pass = graph.pass(format!("{NAME}.bands {name}.{layer}"), PassKind::Graphics);
@@ -183,10 +203,11 @@ fn add_bands(
         list.read(&mut pass, inputs);
         pass.read(params, Access::Uniform(Stage::Vertex));
         pass.read(params, Access::Uniform(Stage::Fragment));
-        pass.read_part(map, part, Access::Sampled(Stage::Fragment));
+        pass.read_part(map, seen, Access::Sampled(Stage::Fragment));
         let push = BandsPush {
             center: center.extend(0.0).to_array(),
-            view: layer,
+            view: layer / 2,
+            side: layer % 2,
         };
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
@@ -201,7 +222,7 @@ fn add_bands(
                 Bind::sampled(1, list.list, nearest),
                 Bind::sampled(2, edges, nearest),
                 Bind::sampled(3, points, nearest),
-                Bind::sampled(4, map, nearest).part(part),
+                Bind::sampled(4, map, nearest).part(seen),
             ];
             ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&push))?;
             list.draw(ctx)
@@ -241,6 +262,7 @@ fn add_visibility<'f>(
     let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
     let shape = shape_number(&inputs.light.shape);
     let options = *options;
+    let masked = u32::from(inputs.scene.has_masks());
     pass.record(move |ctx| {
         let nearest = SamplerDesc::nearest();
         let bindings = [
@@ -265,6 +287,7 @@ fn add_visibility<'f>(
                 (2, options.combine as u32),
                 (3, u32::from(options.cubic)),
                 (4, snap.to_bits()),
+                (5, masked),
             ],
             ..ComputePipelineDesc::new(&spirv::SSOC_VISIBILITY_COMP)
         };

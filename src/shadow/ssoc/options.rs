@@ -2,9 +2,12 @@
 
 use crate::shadow::TechniqueOption;
 
-/// How the visibilities of two edges join.
+/// How several edges join.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Combine {
+    /// The light is cut into as many cells as there are lookups, and each is decided by the edge
+    /// nearest to it.
+    Cells,
     /// Light passes either of two edges where each lies on the other's inner side and their depths
     /// agree, as at a convex corner or a strip; else it must pass both.
     Rule,
@@ -18,7 +21,8 @@ pub enum Combine {
     Or,
 }
 
-const COMBINE: [(&str, Combine); 5] = [
+const COMBINE: [(&str, Combine); 6] = [
+    ("cells", Combine::Cells),
     ("rule", Combine::Rule),
     ("product", Combine::Product),
     ("min", Combine::Min),
@@ -29,11 +33,14 @@ const COMBINE: [(&str, Combine); 5] = [
 /// Options of `ssoc`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SsocOptions {
-    /// Texels across and down the shadow map and each distortion map, 64 to 4096.
+    /// Texels across and down the shadow map, 64 to 4096.
     pub resolution: u32,
-    /// Places of the distortion maps that a pixel looks at, 1 to 6; beyond the first in both maps.
+    /// Texels across and down each distortion map, 64 to 4096.
+    pub bands: u32,
+    /// Places of the distortion maps that a pixel looks at, 1 to 32; 6 at most but for
+    /// [`Combine::Cells`].
     pub lookups: u32,
-    /// How the visibilities of two edges join.
+    /// How several edges join.
     pub combine: Combine,
     /// `3 t^2 - 2 t^3` of the hidden part of the diameter, as published, instead of the light's area.
     pub cubic: bool,
@@ -43,8 +50,9 @@ impl SsocOptions {
     /// What the technique does without options.
     pub const DEFAULT: Self = Self {
         resolution: 1024,
-        lookups: 4,
-        combine: Combine::Rule,
+        bands: 1024,
+        lookups: 13,
+        combine: Combine::Cells,
         cubic: false,
     };
 
@@ -54,19 +62,25 @@ impl SsocOptions {
             "resolution",
             "1024",
             "64 to 4096",
-            "texels across and down the shadow map and each distortion map",
+            "texels across and down the shadow map",
+        ),
+        option(
+            "bands",
+            "1024",
+            "64 to 4096",
+            "texels across and down each distortion map",
         ),
         option(
             "lookups",
-            "4",
-            "1 to 6",
+            "13",
+            "1 to 32, of which combine=cells uses all, else 6",
             "places of the distortion maps that a pixel looks at",
         ),
         option(
             "combine",
-            "rule",
-            "rule (by how the edges lie), product (as published), min, and, or",
-            "how the visibilities of two edges join",
+            "cells",
+            "cells (each lookup decides a part of the light), rule (by how the edges lie), product (as published), min, and, or",
+            "how several edges join",
         ),
         option(
             "area",
@@ -81,6 +95,7 @@ impl SsocOptions {
         let combine = COMBINE.iter().find(|(_, combine)| *combine == self.combine);
         vec![
             self.resolution.to_string(),
+            self.bands.to_string(),
             self.lookups.to_string(),
             combine.map_or("", |(name, _)| name).to_string(),
             if self.cubic { "cubic" } else { "exact" }.to_string(),
@@ -94,7 +109,8 @@ impl SsocOptions {
         };
         match option {
             "resolution" => self.resolution = number(64..=4096)?,
-            "lookups" => self.lookups = number(1..=6)?,
+            "bands" => self.bands = number(64..=4096)?,
+            "lookups" => self.lookups = number(1..=32)?,
             "combine" => self.combine = COMBINE.iter().find(|(name, _)| *name == value)?.1,
             "area" => {
                 self.cubic = match value {

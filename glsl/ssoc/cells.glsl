@@ -1,0 +1,179 @@
+// The light's disk in cells of equal area: what each cell shows is decided by the edge nearest to it.
+//
+// The edge nearest to the receiver's own place gives the first answer, exact where its line is the
+// only one. Then for each cell the place is looked at where a ray to the cell's middle passes the
+// edge's depth: the shadow map tells on which side of the outline that is, the distortion map of that
+// side which edge is nearest. Where that is another edge, the cell's part of the first answer is
+// exchanged for what this edge leaves of the cell. Edges never have to be joined beyond their own
+// cell, so nothing depends on how they lie to each other elsewhere, and edges that are not found
+// cost no more than the cells they cross.
+#ifndef ANTUMBRA_SSOC_CELLS_GLSL
+#define ANTUMBRA_SSOC_CELLS_GLSL
+
+#include "common/combine.glsl"
+#include "ssoc/edge.glsl"
+
+// Middle of a cell in the unit disk: the first in its centre, the others on a ring, or on two rings
+// where there are more than eight.
+vec2 cell_middle(uint cell) {
+    const uint INNER = LOOKUPS > 8u ? (LOOKUPS - 1u) / 3u : LOOKUPS - 1u;
+    bool outer = cell > INNER;
+    float count = float(outer ? LOOKUPS - 1u - INNER : INNER);
+    float before = outer ? float(1u + INNER) : 1.0;
+    float part = (before + 0.5 * count) / float(LOOKUPS);
+    float turn = 6.2831853 * (float(cell - 1u) + (outer ? 0.5 : 0.0)) / max(count, 1.0);
+    return cell == 0u ? vec2(0.0) : sqrt(part) * vec2(cos(turn), sin(turn));
+}
+
+// What an edge leaves of a cell.
+float cell_past(vec3 chord, vec2 middle) {
+    return disk_above(clamp((chord.x + dot(chord.yz, middle)) * sqrt(float(LOOKUPS)), -1.0, 1.0));
+}
+
+// Where the ray to a point of the light is at a depth, in the view's units.
+vec2 passage(Place here, LightView light_view, vec2 middle, float depth) {
+    bool perspective = light_view.forward.w > 0.0;
+    vec3 from = vec3(here.at, 1.0) / (perspective ? here.depth : 1.0);
+    from.z = perspective ? from.z : here.depth;
+    vec3 way = in_view(light_view, here.light.center + middle.x * here.light.x + middle.y * here.light.y);
+    float part = ((perspective ? 1.0 / depth : depth) - from.z) / min(way.z, -1.0e-30);
+    vec3 at = from + max(part, 0.0) * way;
+    return perspective ? at.xy * depth : at.xy;
+}
+
+// How far a depth is before the receiver, in the unit in which rays are straight in the map.
+float rise_of(Place here, LightView light_view, float depth) {
+    return light_view.forward.w > 0.0 ? depth - here.depth : here.depth - depth;
+}
+
+// Depth of what a place of the map shows, as in Place.
+float shown_depth(Place here, LightView light_view, vec2 map) {
+    float stored = map_depth_at(here, map);
+    return light_view.forward.w > 0.0
+        ? stored / light_view.scale.z
+        : (stored - light_view.scale.w) / light_view.scale.z;
+}
+
+// Whether what is in front of the receiver's plane at a place of the map blocks the ray to the
+// cell's middle, which is at the depth `passed` there. If it is nearer to the receiver than that,
+// the ray was at its depth before; a wall that the receiver stands at is no longer there.
+bool still_blocked(Place here, LightView light_view, vec2 middle, vec2 map, float passed) {
+    const float SAME = 0.5;
+    float depth = shown_depth(here, light_view, map);
+    float rise = rise_of(here, light_view, depth);
+    if (rise >= SAME * rise_of(here, light_view, passed)) {
+        return true;
+    }
+    map = map_of(light_view, passage(here, light_view, middle, depth));
+    return rise_of(here, light_view, shown_depth(here, light_view, map)) >= SAME * rise;
+}
+
+// near: the nearest edge on the cell's own side; far: that of the other map, the other edge of a
+// narrow blocker or gap if the way to it leads over the near one.
+float cell_seen(bool blocked, Seen near, Seen far, vec2 middle) {
+    float seen = cell_past(near.chord, middle);
+    vec2 apart = far.nearest - near.nearest;
+    float sign = blocked ? 1.0 : -1.0;
+    bool beyond = sign * dot(apart, near.outward) >= 0.0 && sign * dot(apart, far.outward) <= 0.0;
+    if (far.number == 0u || far.number == near.number || !beyond) {
+        return seen;
+    }
+    float other = cell_past(far.chord, middle);
+    float along = dot(near.chord.yz, far.chord.yz);
+    if (blocked) {
+        return visibility_and(seen, other, along);
+    }
+    bool one_blocker = abs(near.depth - far.depth) < 0.3 * max(abs(near.depth), abs(far.depth));
+    return one_blocker ? 1.0 - visibility_and(1.0 - seen, 1.0 - other, along) : seen;
+}
+
+// Mean depth of what is in front of the receiver within the light's reach, as of blockers whose
+// outlines are not edges, and how many were found. Depths as in Place.
+vec2 searched_depth(Place here, LightView light_view) {
+    float nearest = light_view.forward.w > 0.0 ? 1.0 / params.search.x : params.search.x;
+    float sum = 0.0;
+    float count = 0.0;
+    for (uint cell = 0u; cell < LOOKUPS; ++cell) {
+        vec2 map = map_of(light_view, passage(here, light_view, cell_middle(cell), nearest));
+        bool blocked = in_map(map) && blocked_at(here, map);
+        float depth = shown_depth(here, light_view, map);
+        sum += blocked ? depth : 0.0;
+        count += blocked ? 1.0 : 0.0;
+    }
+    return vec2(sum / max(count, 1.0), count);
+}
+
+float soft_cells(Place here, LightView light_view) {
+    float texel = band_texel(light_view);
+    uint first = 0u;
+    vec3 chord = vec3(1.0, 1.0, 0.0);
+    float depth = 0.0;
+    float result = 1.0;
+    float change = 0.0;
+    bool hidden = false;
+    for (uint cell = 0u; cell < LOOKUPS; ++cell) {
+        vec2 middle = cell_middle(cell);
+        float passed = depth;
+        float hard = 1.0;
+        float seen = 1.0;
+        // A second time where the edge found is not at the depth that was assumed.
+        for (uint attempt = 0u; attempt < 2u; ++attempt) {
+            vec2 at = cell == 0u ? here.at : passage(here, light_view, middle, passed);
+            vec2 map = map_of(light_view, at);
+            if (!in_map(map)) {
+                seen = cell_past(chord, middle);
+                break;
+            }
+            bool blocked = blocked_at(here, map);
+            if (MASKED == 0u && cell > 0u && blocked) {
+                blocked = still_blocked(here, light_view, middle, map, passed);
+            }
+            uint near_entry = edge_at(here, map, blocked);
+            uint far_entry = edge_at(here, map, !blocked);
+            hard = blocked ? 0.0 : 1.0;
+            // Without an outline near, it is as at the receiver's own place, or else as the first
+            // edge has it.
+            hidden = cell == 0u ? blocked : hidden;
+            seen = MASKED != 0u || blocked == hidden ? hard : cell_past(chord, middle);
+            if (cell > 0u && (near_entry & EDGE_NUMBER) == first && far_entry == 0u) {
+                seen = first == 0u && MASKED != 0u ? hard : cell_past(chord, middle);
+                break;
+            }
+            Seen near = look_at(here, light_view, near_entry, at);
+            Seen far = look_at(here, light_view, far_entry, at);
+            if (cell == 0u) {
+                Seen wide = near.number != 0u && (far.number == 0u || near.width > far.width) ? near : far;
+                depth = wide.depth;
+                if (wide.number == 0u) {
+                    vec2 searched = MASKED != 0u ? searched_depth(here, light_view) : vec2(0.0);
+                    if (searched.y == 0.0) {
+                        return blocked && blocked_around(here) ? 0.0 : 1.0;
+                    }
+                    depth = searched.x;
+                }
+                first = near.number;
+                chord = near.number != 0u ? near.chord : vec3(blocked ? -1.0 : 1.0, 1.0, 0.0);
+                result = near.number != 0u ? seen_past(near) : hard;
+            }
+            if (near.number != 0u) {
+                // The line of an edge that says the opposite of the map is not the outline here.
+                bool other_side = blocked ? near.delta > 1.5 * texel : near.delta < -1.5 * texel;
+                if (!other_side) {
+                    seen = cell_seen(blocked, near, far, middle);
+                }
+            }
+            if (cell == 0u || near.number == 0u) {
+                break;
+            }
+            vec2 again = passage(here, light_view, middle, near.depth);
+            if (distance(again, at) < 0.75 * texel) {
+                break;
+            }
+            passed = near.depth;
+        }
+        change += seen - cell_past(chord, middle);
+    }
+    return clamp(result + change / float(LOOKUPS), 0.0, 1.0);
+}
+
+#endif

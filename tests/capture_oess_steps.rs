@@ -229,3 +229,69 @@ fn two_candidates_are_better_than_one() {
     assert!(errors[1] <= 0.03 && errors[2] <= 0.006, "{errors:?}");
     assert!(errors[0] > errors[1], "{errors:?}");
 }
+
+/// Slats of which each end sees the next one alone on its way to the light, under a line of 2 m.
+const SLATS: [(f32, [f32; 2]); 4] = [
+    (5.0, [-0.5, -0.4]),
+    (5.0, [-0.05, 0.05]),
+    (6.0, [0.15, 0.3]),
+    (5.0, [0.4, 0.5]),
+];
+
+/// The line's two ends see all that hides it from a half-plane's penumbra, and nothing more is done; of
+/// slats they see two.
+#[test]
+fn segments_are_looked_at_where_something_hides_between_the_ends() {
+    let _one = support::serial();
+    let half_plane = [(5.0, [-30.0, 0.0])];
+    let lines = |blockers: &[(f32, [f32; 2])], length: f32| {
+        let plates = blockers
+            .iter()
+            .map(|(depth, x)| plate("blocker", *x, [-3.0, 3.0], *depth));
+        scene(
+            std::iter::once(floor()).chain(plates).collect(),
+            line(length),
+        )
+    };
+    let worst = |image: &[f32], blockers: &[(f32, [f32; 2])]| {
+        let errors = image.iter().enumerate().map(|(i, v)| {
+            let wanted = truth(floor_x(i as u32 % SIZE), HEIGHT, blockers, |_| 1.0);
+            (v - wanted).abs()
+        });
+        errors.fold(0.0, f32::max)
+    };
+    for (name, blockers, open) in [("half-plane", &half_plane[..], 0), ("slats", &SLATS, 1000)] {
+        let scene = lines(blockers, LENGTH);
+        let names = ["oess.open 0:lamp"];
+        let found = frame(&scene, &camera(), "oess", &names);
+        let opened = found.images[0].iter().filter(|part| **part != 0).count();
+        let error = worst(&found.visibility, blockers);
+        let ends = frame(&scene, &camera(), "oess:segments=1", &[]).visibility;
+        let by_ends = worst(&ends, blockers);
+        println!("{name}: {opened} open, error {error}; by ends alone {by_ends}");
+        assert!(error <= 0.002, "{name}: {error}");
+        if open == 0 {
+            assert_eq!(opened, 0, "{name}");
+            assert_eq!(found.visibility, ends, "{name}");
+        } else {
+            assert!(opened > open, "{name}: {opened}");
+            assert!(by_ends > 0.08, "{name}: {by_ends}");
+        }
+    }
+    // Nothing that a map shows hides between points so near to each other: no maps of further points.
+    let passes = |length: f32| {
+        let scene = lines(&SLATS, length);
+        let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
+        let request = FrameRequest {
+            camera: camera(),
+            size: [SIZE; 2],
+            lights: vec![0],
+            technique: "oess".parse().unwrap(),
+        };
+        let frame = renderer.render(&request).unwrap();
+        support::assert_no_messages(&renderer.destroy().unwrap());
+        let maps = frame.passes.iter().map(|(name, _)| name);
+        maps.filter(|name| name.starts_with("oess.map ")).count()
+    };
+    assert_eq!([passes(1.0e-3), passes(LENGTH)], [2, 9]);
+}

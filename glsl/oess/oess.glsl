@@ -304,7 +304,11 @@ struct Parts {
     vec2 first;
     vec2 middle;
     vec2 last;
+    vec2 open; // holds the middle part: blockers that neither end sees may hide some of it
 };
+
+// A middle part that is shorter is not worth a look at what its ends do not see.
+const float LEAST_OPEN = 1.0 / 1024.0;
 
 // The visible parts by the published rules of merging (section 3.4): each penumbra is one part from an
 // end that is seen; a receiver in both that neither end sees has what they have in common.
@@ -318,12 +322,13 @@ Parts merged_parts(End from, End to, vec2 size_texels) {
     vec2 last = vec2(1.0 - reach_to, 1.0);
     bool overlap = first.y >= last.x;
     if (from.seen && to.seen) {
-        return overlap ? Parts(vec2(0.0, 1.0), none, none) : Parts(first, none, last);
+        return overlap ? Parts(vec2(0.0, 1.0), none, none, none)
+            : Parts(first, none, last, none);
     }
     bool common_part = in_from == in_to && reach_from < 1.0 && reach_to < 1.0;
     vec2 middle = common_part ? vec2(last.x, first.y) : none;
-    return in_from != in_to ? (in_from ? Parts(first, none, none) : Parts(none, none, last))
-        : Parts(none, middle, none);
+    return in_from != in_to ? (in_from ? Parts(first, none, none, none) : Parts(none, none, last, none))
+        : Parts(none, middle, none, none);
 }
 
 // The visible parts of a segment. From an end that is seen, one part up to its first blocker, and
@@ -358,7 +363,9 @@ Parts visible_parts(End from, End to, Receiver receiver, vec2 size_texels, float
     if (both && GAPS == 0u) {
         middle = vec2(1.0);
     }
-    return Parts(first, middle, last);
+    // The nearest blockers' far ends are only what one end sees of them: both are looked at anew.
+    bool open = middle.y - middle.x > LEAST_OPEN;
+    return Parts(first, middle, last, open ? vec2(first.y, last.x) : vec2(1.0));
 }
 
 #endif

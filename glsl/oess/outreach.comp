@@ -20,17 +20,22 @@ layout(local_size_x = 32) in;
 layout(set = 0, binding = 0) uniform sampler2D map_depth;
 layout(set = 0, binding = 1, r32ui) uniform uimage2D outreach;
 layout(set = 0, binding = 2, r32ui) uniform writeonly uimage2D steps;
+layout(set = 0, binding = 3) uniform usampler2D rows; // 0 for those that nobody asks for
 
 layout(push_constant) uniform Push {
     float shift;  // texels for stored depth 1
     int backward; // 0: from the line's start towards its end; 1: from the end
-    int layer;
+    int sector;
 } push;
 
 void main() {
     ivec2 size = textureSize(map_depth, 0);
     int row = int(gl_GlobalInvocationID.x);
     if (row >= size.y) {
+        return;
+    }
+    if (texelFetch(rows, ivec2(row, push.sector), 0).x == 0u) {
+        imageStore(steps, ivec2(row, 0), uvec4(0u));
         return;
     }
     int sign = push.backward != 0 ? -1 : 1;

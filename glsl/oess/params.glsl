@@ -5,7 +5,7 @@
 #include "common/light_view.glsl"
 
 const uint MAX_SECTORS = 4u;
-const uint MAX_POINTS = 5u;
+const uint MAX_POINTS = 9u;
 const uint MAX_PROFILE = 8u;
 
 struct OessParams {
@@ -31,5 +31,9 @@ uint edge_of(uint texel) {
 uint run_of(uint texel) {
     return texel >> EDGE_BITS;
 }
+
+// What is open at a pixel. x: packUnorm2x16 of where that part of the line begins and ends, 0 for none;
+// y: row of the maps around its surface, and above it the sector.
+const uint ROW_BITS = 16u;
 
 #endif

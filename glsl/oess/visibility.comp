@@ -26,12 +26,23 @@ layout(set = 0, binding = 9) uniform sampler2D triangles;
 layout(set = 0, binding = 10) uniform sampler2D materials;
 layout(set = 0, binding = 11) uniform sampler2D uvs;
 layout(set = 0, binding = 12) uniform sampler2D texels;
-layout(set = 0, binding = 13, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 13, r32f) uniform image2D visibility;
 layout(set = 0, binding = 14, std140) uniform Arguments {
     TileArguments arguments;
 };
 layout(set = 0, binding = 15) uniform usampler2D list;
-layout(set = 0, binding = 16, rg32f) uniform writeonly image2D influences;
+layout(set = 0, binding = 16, rg32f) uniform image2D influences;
+layout(set = 0, binding = 17, rg32ui) uniform uimage2D open_parts; // see params.glsl
+
+layout(push_constant) uniform Push {
+    uint stage;
+    uint stride; // segments from one end that is looked at to the next
+} push;
+
+// All there is. Or first what the line's ends say, and what they leave open; then that.
+const uint STAGE_ONLY = 0u;
+const uint STAGE_FIRST = 1u;
+const uint STAGE_SECOND = 2u;
 
 vec4 gather_map_depths(vec2 place, uint layer) {
     return textureGather(map_depth, vec3(place, float(layer)));
@@ -84,10 +95,11 @@ End end_of(uint point, uint sector, Receiver receiver) {
     End end;
     end.position = params.start.xyz + params.axis.xyz * (params.start.w * float(point));
     end.along = params.axis.xyz;
-    end.length_m = params.start.w;
-    end.texels = params.shift[sector].x;
+    float stride = float(push.stride);
+    end.length_m = params.start.w * stride;
+    end.texels = params.shift[sector].x * stride;
     end.layer = sector * params.counts.y + point;
-    end.outreach = sector * (params.counts.y - 1u) + point;
+    end.outreach = (sector * (params.counts.y - 1u) + point) / push.stride;
     end.backward = false;
     receiver.to_light = end.position - receiver.position;
     end.facing = dot(receiver.normal, receiver.to_light) > 0.0;
@@ -139,6 +151,45 @@ void add_part(inout vec3 sum, float from, float to) {
     sum += vec3(light.x, light.x - light.y, light.y);
 }
 
+// The light of a range of the line that reaches a receiver, as add_part adds it. In the first stage without
+// what is open, which is returned.
+vec3 light_between(vec2 range, uint sector, Receiver receiver, inout uvec2 open) {
+    vec2 size_texels = vec2(params.counts.zw);
+    LightView first = params.views[sector * params.counts.y];
+    vec2 texel_m = abs(1.0 / first.scale.xy) / size_texels;
+    float widest_m = max(texel_m.x, texel_m.y);
+    uint spans = (params.counts.y - 1u) / push.stride;
+    uint begin = uint(clamp(floor(range.x * float(spans)), 0.0, float(spans)));
+    uint end = uint(clamp(ceil(range.y * float(spans)), 0.0, float(spans)));
+    vec3 sum = vec3(0.0);
+    End from;
+    for (uint span = begin; span < end; ++span) {
+        if (span == begin) {
+            from = end_of(span * push.stride, sector, receiver);
+        }
+        End to = end_of((span + 1u) * push.stride, sector, receiver);
+        End back = to;
+        back.backward = true;
+        back.along = -back.along;
+        back.outreach = from.outreach;
+        Parts parts = visible_parts(from, back, receiver, size_texels, widest_m);
+        vec2 parts_of_line[3] = vec2[3](parts.first, parts.last, parts.middle);
+        uint count = 3u;
+        vec2 wanted = vec2(max(parts.open.x, range.x), min(parts.open.y, range.y));
+        if (push.stage == STAGE_FIRST && wanted.y > wanted.x) {
+            open.x = packUnorm2x16(wanted);
+            open.y = uint(max(from.place.y, 0.0)) | sector << ROW_BITS;
+            count = 2u;
+        }
+        for (uint i = 0u; i < count; ++i) {
+            vec2 part = (parts_of_line[i] + float(span)) / float(spans);
+            add_part(sum, max(part.x, range.x), min(part.y, range.y));
+        }
+        from = to;
+    }
+    return sum;
+}
+
 void main() {
     uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
     if (index >= arguments.count) {
@@ -160,43 +211,39 @@ void main() {
     // Visible part; what of it counts for the line's first end and for its last.
     vec2 whole = light_before(1.0);
     vec3 sum = vec3(1.0, 1.0 - whole.y, whole.y);
+    uvec2 open = uvec2(0u);
+    vec2 range = vec2(0.0, 1.0); // of the line, that is looked at
+    if (push.stage == STAGE_SECOND) {
+        open = imageLoad(open_parts, ivec2(pixel)).xy;
+        if (open.x == 0u) {
+            return;
+        }
+        range = unpackUnorm2x16(open.x);
+    }
     uint sector = depth > 0.0 ? sector_of(p) : params.counts.x;
     if (depth > 0.0) {
         // The part of the line above the receiver's plane.
-        float segments = float(params.counts.y - 1u);
-        vec3 last = params.start.xyz + params.axis.xyz * (params.start.w * segments);
+        uint segments = params.counts.y - 1u;
+        vec3 last = params.start.xyz + params.axis.xyz * (params.start.w * float(segments));
         float height_from = dot(n, params.start.xyz - p);
         float height_to = dot(n, last - p);
         float crossing = height_from / (height_from - height_to);
         vec2 above = vec2(height_from > 0.0 ? 0.0 : height_to > 0.0 ? crossing : 1.0,
             height_to > 0.0 ? 1.0 : height_from > 0.0 ? crossing : 0.0);
+        range = vec2(max(range.x, above.x), min(range.y, above.y));
         sum = vec3(0.0);
+        if (push.stage == STAGE_SECOND) {
+            sum = vec3(imageLoad(visibility, ivec2(pixel)).x, imageLoad(influences, ivec2(pixel)).xy);
+        }
         if (sector == params.counts.x) {
-            add_part(sum, above.x, above.y);
+            add_part(sum, range.x, range.y);
         } else {
-            vec2 size_texels = vec2(params.counts.zw);
-            LightView first = params.views[sector * params.counts.y];
-            vec2 texel_m = abs(1.0 / first.scale.xy) / size_texels;
-            float widest_m = max(texel_m.x, texel_m.y);
-            End from = end_of(0u, sector, receiver);
-            for (uint segment = 0u; segment + 1u < params.counts.y; ++segment) {
-                End to = end_of(segment + 1u, sector, receiver);
-                End back = to;
-                back.backward = true;
-                back.along = -back.along;
-                back.outreach = from.outreach;
-                Parts parts = visible_parts(from, back, receiver, size_texels, widest_m);
-                float before = float(segment);
-                vec2 first_part = (parts.first + before) / segments;
-                vec2 middle_part = (parts.middle + before) / segments;
-                vec2 last_part = (parts.last + before) / segments;
-                add_part(sum, max(first_part.x, above.x), min(first_part.y, above.y));
-                add_part(sum, max(middle_part.x, above.x), min(middle_part.y, above.y));
-                add_part(sum, max(last_part.x, above.x), min(last_part.y, above.y));
-                from = to;
-            }
+            sum += light_between(range, sector, receiver, open);
         }
     }
     imageStore(visibility, ivec2(pixel), vec4(clamp(sum.x, 0.0, 1.0)));
     imageStore(influences, ivec2(pixel), vec4(sum.yz, 0.0, 0.0));
+    if (push.stage == STAGE_FIRST) {
+        imageStore(open_parts, ivec2(pixel), uvec4(open, 0u, 0u));
+    }
 }

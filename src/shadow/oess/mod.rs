@@ -14,25 +14,30 @@
 //! |---|---|
 //! | `params` | views |
 //! | `map` | depths and triangles seen from each end |
+//! | `rows` | which rows of the maps are asked for |
 //! | `outreach` | each texel's occluding edge, and where its surface ends |
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility, and the influence of both ends |
+//! | `open` | tiles where blockers may hide between the ends, and rows of the maps around them |
+//! | `outreach`, `visibility` again | for segments of the line there, whose ends have maps as well |
+//!
+//! The paper cuts long lights into segments. Neither end sees what hides behind the first blocker on
+//! the way from it, so that the part of the line between the two blockers is open; where there is none,
+//! two maps are exact, and nothing else is done for those pixels.
 
 mod options;
 mod outreach;
 mod views;
+mod visibility;
 
-pub use options::{Find, OessOptions, Outreach};
+pub use options::{Find, MOST_SEGMENTS, OessOptions, Outreach};
 
 use super::light_view::LightView;
-use super::map::{ShadowMap, add_maps_of_size};
-use super::receivers::add_receivers;
+use super::map::add_maps_of_size;
 use super::{ShadowInputs, ShadowMask, hard};
 use crate::geometry::DrawTarget;
-use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, PassKind, Stage};
+use crate::graph::{Access, BufferDesc, BufferId, Graph, PassKind};
 use crate::light::{AreaLight, LightProfile, LightShape, MAX_PROFILE, ShapeKind};
-use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use views::{LineViews, MOST_SECTORS, line_views};
 
@@ -43,7 +48,7 @@ pub(super) const NAME: &str = "oess";
 pub(super) const SHAPES: &[ShapeKind] = &[ShapeKind::Line, ShapeKind::Point];
 
 /// Most points of a line that have a map.
-const MOST_POINTS: usize = 5;
+const MOST_POINTS: usize = MOST_SEGMENTS as usize + 1;
 
 /// `OessParams` in `oess/params.glsl`.
 #[repr(C)]
@@ -54,7 +59,8 @@ struct OessParams {
     counts: [u32; 4],
     shift: [[f32; 4]; MOST_SECTORS],
     profile: [[f32; 4]; MAX_PROFILE],
-    views: [LightView; MOST_SECTORS * MOST_POINTS],
+    /// One after the other: sector * points + point.
+    views: [[LightView; MOST_POINTS]; MOST_SECTORS],
 }
 
 /// A line whose length is a smaller part than this of the distance to what it lights is a point: no
@@ -74,11 +80,22 @@ pub(super) fn add_passes<'f>(
     if length <= SHORTEST * farthest_receiver(inputs) {
         return hard::add_passes(graph, inputs);
     }
-    let points = options.segments as usize + 1;
     let boxes = inputs.scene.draws().iter().map(|draw| draw.bounds);
     let boxes: Vec<_> = boxes.collect();
-    let views = line_views(&inputs.light, &inputs.receivers, &boxes, points);
-    let params = params_of(&inputs.light, &views, &options, length);
+    let by_need = options.segments.is_none() && options.outreach == Outreach::Hull;
+    let views_of = |segments: u32| {
+        let points = segments as usize + 1;
+        line_views(&inputs.light, &inputs.receivers, &boxes, points, by_need)
+    };
+    let mut views = views_of(options.segments.unwrap_or(1));
+    let segments = match options.segments {
+        None if by_need => segments_for(&views, options.resolution),
+        fixed => fixed.unwrap_or(1),
+    };
+    if by_need && segments > 1 {
+        views = views_of(segments);
+    }
+    let params = params_of(&inputs.light, &views, &options, segments, length);
     let buffer = add_params(graph, inputs, params);
     let maps = add_maps_of_size(
         graph,
@@ -88,8 +105,28 @@ pub(super) fn add_passes<'f>(
         DrawTarget::Ids,
         options.resolution,
     );
-    let outreach = outreach::add_outreach(graph, inputs, &options, &maps, &params);
-    add_visibility(graph, inputs, &options, buffer, &maps, outreach)
+    let line = visibility::Line {
+        options,
+        data: params,
+        params: buffer,
+        maps,
+    };
+    if by_need && segments > 1 {
+        line.add_by_need(graph, inputs, segments)
+    } else {
+        line.add_whole(graph, inputs)
+    }
+}
+
+/// Segments of a line that may hide something between its ends, given the views from these. Between
+/// points that are nearer than some texels in front of a receiver, nothing hides that a map would show.
+fn segments_for(views: &LineViews, resolution: u32) -> u32 {
+    match views.widest * f64::from(resolution) {
+        texels if texels < 4.0 => 1,
+        texels if texels < 16.0 => 2,
+        texels if texels < 64.0 || views.sectors > 1 => 4,
+        _ => MOST_SEGMENTS,
+    }
 }
 
 fn farthest_receiver(inputs: &ShadowInputs<'_>) -> f32 {
@@ -102,9 +139,9 @@ fn params_of(
     light: &AreaLight,
     views: &LineViews,
     options: &OessOptions,
+    segments: u32,
     length: f32,
 ) -> OessParams {
-    let segments = options.segments;
     let points = segments as usize + 1;
     let segment = length / segments as f32;
     let start = light.center - light.axis_x * (0.5 * length);
@@ -120,10 +157,10 @@ fn params_of(
         ],
         shift: [[0.0; 4]; MOST_SECTORS],
         profile,
-        views: [LightView::default(); MOST_SECTORS * MOST_POINTS],
+        views: [[LightView::default(); MOST_POINTS]; MOST_SECTORS],
     };
     for (layer, view) in views.views.views.iter().enumerate() {
-        params.views[layer] = *view;
+        params.views.as_flattened_mut()[layer] = *view;
         // A point at depth z moves by segment / z; the map holds scale.z / z.
         let texels = segment * view.scale[0] * options.resolution as f32;
         params.shift[layer / points] = [texels / view.scale[2], 0.0, 0.0, 0.0];
@@ -160,91 +197,4 @@ fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: OessPara
     let buffer = pass.overwrite(buffer, Access::Clear);
     pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
     buffer
-}
-
-fn add_visibility<'f>(
-    graph: &mut Graph<'f>,
-    inputs: &ShadowInputs<'f>,
-    options: &OessOptions,
-    params: BufferId,
-    maps: &ShadowMap,
-    outreach: outreach::OutreachMaps,
-) -> ShadowMask {
-    let name = &inputs.light_name;
-    let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.bounding_radius());
-    let list = receivers.list;
-    let ShadowMap {
-        depth: map_depth,
-        ids: Some(map_ids),
-    } = *maps
-    else {
-        unreachable!("triangle numbers were asked for");
-    };
-    let [width, height] = inputs.camera.size();
-    let desc = ImageDesc::new(vk::Format::R32G32_SFLOAT, width, height);
-    let influences = graph.create_image(format!("{NAME}.influences {name}"), desc);
-    let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
-    let (view_params, part) = inputs.view_params;
-    let compute = Access::Sampled(Stage::Compute);
-    let mut pass = graph.pass(format!("{NAME}.visibility {name}"), PassKind::Compute);
-    pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
-    pass.read(params, Access::Uniform(Stage::Compute));
-    let images = [
-        gbuffer.view_depth,
-        gbuffer.geometric_normal,
-        gbuffer.ids,
-        map_depth,
-        map_ids,
-        outreach.forward,
-        outreach.backward,
-        ids.triangles,
-    ];
-    for image in images.into_iter().chain(ids.mask_images()) {
-        pass.read(image, compute);
-    }
-    list.read(&mut pass);
-    let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
-    let influences = pass.overwrite(influences, Access::StorageWrite(Stage::Compute));
-    let masked = u32::from(inputs.scene.has_masks());
-    let options = *options;
-    pass.record(move |ctx| {
-        let nearest = SamplerDesc::nearest();
-        let bindings = [
-            Bind::uniform(0, view_params).part(part),
-            Bind::uniform(1, params),
-            Bind::sampled(2, gbuffer.view_depth, nearest),
-            Bind::sampled(3, gbuffer.geometric_normal, nearest),
-            Bind::sampled(4, gbuffer.ids, nearest),
-            Bind::sampled(5, map_depth, nearest).array(),
-            Bind::sampled(6, map_ids, nearest).array(),
-            Bind::sampled(7, outreach.forward, nearest).array(),
-            Bind::sampled(8, outreach.backward, nearest).array(),
-            Bind::sampled(9, ids.triangles, nearest),
-            Bind::sampled(10, ids.materials, nearest),
-            Bind::sampled(11, ids.triangle_uvs, nearest),
-            Bind::sampled(12, ids.texels, nearest),
-            Bind::storage_image(13, visibility),
-            Bind::uniform(14, list.arguments),
-            Bind::sampled(15, list.tiles, nearest),
-            Bind::storage_image(16, influences),
-        ];
-        // Four steps of the grid that vertices snap to: SNAP_TEXELS in hard.glsl.
-        let steps = ctx.gpu().info().limits.sub_pixel_precision_bits.min(16);
-        let snap = 4.0 / (1u32 << steps) as f32;
-        let pipeline = ComputePipelineDesc {
-            constants: vec![
-                (0, snap.to_bits()),
-                (1, masked),
-                (2, u32::from(options.exact)),
-                (3, options.walk),
-                (4, u32::from(options.gaps)),
-                (5, u32::from(options.outreach != Outreach::Hull)),
-                (6, u32::from(options.by_place)),
-            ],
-            ..ComputePipelineDesc::new(&spirv::OESS_VISIBILITY_COMP)
-        };
-        ctx.bind_compute(&pipeline, &bindings, &[])?;
-        list.dispatch(ctx)
-    });
-    ShadowMask::new(visibility)
 }

@@ -2,6 +2,9 @@
 
 use crate::shadow::TechniqueOption;
 
+/// Most segments of a line.
+pub const MOST_SEGMENTS: u32 = 8;
+
 /// How the occluding edges that hide light from a texel are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outreach {
@@ -57,8 +60,9 @@ fn name_of<T: Copy + PartialEq>(list: &[(&'static str, T)], value: T) -> &'stati
 pub struct OessOptions {
     /// Texels across and down each end's map, 64 to 4096.
     pub resolution: u32,
-    /// Segments that the line is cut into, 1 to 4; they share the maps of their ends.
-    pub segments: u32,
+    /// Segments that the line is cut into, 1 to [`MOST_SEGMENTS`]; they share the maps of their ends.
+    /// None: as many as what hides between the line's ends may need, where it does.
+    pub segments: Option<u32>,
     /// Edges lie where triangles end in the receiver's plane, not between texels.
     pub exact: bool,
     /// Light may come between the blockers nearest to both ends, where both ends are seen.
@@ -78,7 +82,7 @@ impl OessOptions {
     /// What the technique does without options.
     pub const DEFAULT: Self = Self {
         resolution: 1024,
-        segments: 1,
+        segments: None,
         exact: true,
         gaps: true,
         walk: 2,
@@ -97,8 +101,8 @@ impl OessOptions {
         ),
         option(
             "segments",
-            "1",
-            "1 to 4",
+            "auto",
+            "auto (where blockers may hide between the line's ends) or 1 to 8",
             "segments of the line, which share the maps of their ends",
         ),
         option(
@@ -143,7 +147,8 @@ impl OessOptions {
     pub(in crate::shadow) fn values(&self) -> Vec<String> {
         vec![
             self.resolution.to_string(),
-            self.segments.to_string(),
+            self.segments
+                .map_or("auto".to_string(), |segments| segments.to_string()),
             if self.exact { "exact" } else { "texels" }.to_string(),
             u32::from(self.gaps).to_string(),
             self.walk.to_string(),
@@ -160,7 +165,8 @@ impl OessOptions {
         };
         match option {
             "resolution" => self.resolution = number(64..=4096)?,
-            "segments" => self.segments = number(1..=4)?,
+            "segments" if value == "auto" => self.segments = None,
+            "segments" => self.segments = Some(number(1..=MOST_SEGMENTS)?),
             "edges" => {
                 self.exact = match value {
                     "exact" => true,

@@ -8,7 +8,18 @@ use crate::shadow::map::ShadowMap;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-/// Outreach maps, R32_UINT: `oess/params.glsl`. A layer for each sector and segment.
+/// What to look for edges between.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spans {
+    /// In names of passes and images.
+    pub suffix: &'static str,
+    /// Segments from one end to the next.
+    pub stride: u32,
+    /// R32_UINT, a row for each sector: 0 for a row of the maps that nobody asks for.
+    pub rows: ImageId,
+}
+
+/// Outreach maps, R32_UINT: `oess/params.glsl`. A layer for each sector and span.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OutreachMaps {
     /// From segments' first ends.
@@ -23,7 +34,7 @@ pub(super) struct OutreachMaps {
 struct HullPush {
     shift: f32,
     backward: u32,
-    layer: u32,
+    sector: u32,
 }
 
 /// Push constants of `oess/row.glsl`.
@@ -42,6 +53,7 @@ struct Layer {
     map: ImagePart,
     part: ImagePart,
     size: [u32; 2],
+    sector: u32,
     push: RowPush,
 }
 
@@ -51,21 +63,27 @@ pub(super) fn add_outreach(
     options: &OessOptions,
     maps: &ShadowMap,
     params: &OessParams,
+    of: Spans,
 ) -> OutreachMaps {
     let [sectors, points, width, height] = params.counts;
-    let layers = sectors * (points - 1);
+    let (spans, suffix) = ((points - 1) / of.stride, of.suffix);
+    let layers = sectors * spans;
     let name = &inputs.light_name;
     let size = if layers == 0 { [1, 1] } else { [width, height] };
     let mut direction = |backward: bool| {
         let word = if backward { "backward" } else { "forward" };
         let desc = ImageDesc::new(vk::Format::R32_UINT, size[0], size[1]).layers(layers.max(1));
-        let mut image = graph.create_image(format!("{NAME}.{word} {name}"), desc);
+        let mut image = graph.create_image(format!("{NAME}.{word}{suffix} {name}"), desc);
         // Steps that each row took: for those who ask for the image.
         let steps = ImageDesc::new(vk::Format::R32_UINT, size[1], 1).layers(layers.max(1));
-        let mut steps = graph.create_image(format!("{NAME}.{word}_steps {name}"), steps);
+        let mut steps = graph.create_image(format!("{NAME}.{word}{suffix}_steps {name}"), steps);
         for layer in 0..layers.max(1) {
-            let (sector, segment) = (layer / (points - 1), layer % (points - 1));
-            let map = sector * points + segment + u32::from(backward);
+            let (sector, first) = (layer / spans, layer % spans * of.stride);
+            let (near, far) = match backward {
+                false => (first, first + of.stride),
+                true => (first + of.stride, first),
+            };
+            let map = sector * points + near;
             let point = |point: u32| {
                 let [x, y, z, step] = params.start;
                 let along = step * point as f32;
@@ -78,19 +96,20 @@ pub(super) fn add_outreach(
                 ]
             };
             let at = Layer {
-                name: format!("{name}.{word}.{layer}"),
+                name: format!("{name}.{word}{suffix}.{layer}"),
                 map: ImagePart::layer(if layers == 0 { 0 } else { map }),
                 part: ImagePart::layer(layer),
                 size,
+                sector,
                 push: RowPush {
-                    here: point(segment + u32::from(backward)),
-                    there: point(segment + u32::from(!backward)),
-                    shift: params.shift[sector as usize][0],
+                    here: point(near),
+                    there: point(far),
+                    shift: params.shift[sector as usize][0] * of.stride as f32,
                     backward: u32::from(backward),
                 },
             };
             [image, steps] = match options.outreach {
-                Outreach::Hull => add_hull(graph, maps, &at, [image, steps]),
+                Outreach::Hull => add_hull(graph, maps, &at, of.rows, [image, steps]),
                 _ => add_candidates(graph, inputs, options, maps, &at, [image, steps]),
             };
         }
@@ -107,18 +126,20 @@ fn add_hull(
     graph: &mut Graph<'_>,
     maps: &ShadowMap,
     at: &Layer,
+    rows_asked: ImageId,
     [image, steps]: [ImageId; 2],
 ) -> [ImageId; 2] {
     let (depth, map, part) = (maps.depth, at.map, at.part);
     let mut pass = graph.pass(format!("{NAME}.outreach {}", at.name), PassKind::Compute);
     pass.read_part(depth, map, Access::Sampled(Stage::Compute));
+    pass.read(rows_asked, Access::Sampled(Stage::Compute));
     // A row reads nothing but what the same invocation wrote.
     let image = pass.overwrite_part(image, part, Access::StorageWrite(Stage::Compute));
     let steps = pass.overwrite_part(steps, part, Access::StorageWrite(Stage::Compute));
     let push = HullPush {
         shift: at.push.shift,
         backward: at.push.backward,
-        layer: 0,
+        sector: at.sector,
     };
     let rows = at.size[1];
     pass.record(move |ctx| {
@@ -127,6 +148,7 @@ fn add_hull(
             Bind::sampled(0, depth, SamplerDesc::nearest()).part(map),
             Bind::storage_image(1, image).part(part),
             Bind::storage_image(2, steps).part(part),
+            Bind::sampled(3, rows_asked, SamplerDesc::nearest()),
         ];
         let pipeline = ComputePipelineDesc::new(shader);
         ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;

@@ -29,18 +29,22 @@ pub(super) struct LineViews {
     pub views: LightViews,
     /// Number of sectors.
     pub sectors: usize,
+    /// Largest part of a map's width that the line's length may be in front of a receiver.
+    pub widest: f64,
 }
 
 /// Axes of a sector: along the line, across, away from it.
 type Frame = [DVec3; 3];
 
 /// Finds the sectors around a line that hold receivers, given as convex hulls, and the views from
-/// its points `first`, `first + step`, .. (metres), of which there are `points`.
+/// its points, of which there are so many at equal distances. Each view holds what may hide its
+/// neighbours from receivers, with `ends` those of the line's ends what may hide the other end.
 pub(super) fn line_views(
     light: &AreaLight,
     receivers: &[Vec<DVec3>],
     casters: &[Aabb],
     points: usize,
+    ends: bool,
 ) -> LineViews {
     let axis = light.axis_x.as_dvec3().normalize();
     let length = 2.0 * f64::from(light.shape.bounding_radius());
@@ -53,6 +57,7 @@ pub(super) fn line_views(
             clip_from_scene: Vec::new(),
         },
         sectors: 0,
+        widest: 0.0,
     };
     for (frame, whole) in sectors(light, receivers) {
         let [right, _, forward] = frame;
@@ -84,11 +89,15 @@ pub(super) fn line_views(
         let ends: Vec<(f64, f64)> = (0..points)
             .map(|point| {
                 let (low, high) = extent(length * point as f64 / (points - 1) as f64);
-                // What hides the next point from a receiver lies at most that far beyond it.
-                let beyond = length / (points - 1) as f64 / blocker;
-                let after = if point + 1 < points { beyond } else { 0.0 };
-                let before = if point > 0 { beyond } else { 0.0 };
-                (low - before, high + after)
+                // What hides a point so far away from a receiver lies at most that far beyond it.
+                let step = length / (points - 1) as f64;
+                let (outer, last) = (if ends { length } else { step }, points - 1);
+                let (before, after) = match point {
+                    0 => (0.0, outer),
+                    _ if point == last => (outer, 0.0),
+                    _ => (step, step),
+                };
+                (low - before / blocker, high + after / blocker)
             })
             .collect();
         let widest = ends.iter().map(|(a, b)| b - a).fold(1.0e-6, f64::max);
@@ -107,6 +116,7 @@ pub(super) fn line_views(
                 near,
             );
         }
+        views.widest = views.widest.max(length / blocker / widest);
         views.sectors += 1;
     }
     views

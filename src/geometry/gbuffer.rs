@@ -21,6 +21,31 @@ pub struct GBuffer {
     pub shading_normal: ImageId,
 }
 
+/// Declares the pass that finds the triangle at each pixel: [`GBuffer::ids`]. A host with a G-buffer
+/// of its own needs it too; it is left out where the technique does not ask for triangles.
+pub fn add_triangle_ids<'f>(
+    graph: &mut Graph<'f>,
+    scene: &'f SceneBuffers,
+    ids: &SceneIds,
+    camera: &SceneCamera,
+    size: [u32; 2],
+) -> ImageId {
+    let [width, height] = size;
+    let image = |format| ImageDesc::new(format, width, height);
+    let aspect = width as f32 / height as f32;
+    let matrix = camera.view_projection_reversed(aspect);
+    let triangle_ids = graph.create_image("gbuffer.ids", image(vk::Format::R32_UINT));
+    let depth = graph.create_image("gbuffer.depth", image(vk::Format::D32_SFLOAT));
+    let mut pass = graph.pass("gbuffer.ids", PassKind::Graphics);
+    read_for_draw(&mut pass, scene, ids);
+    let triangle_ids = pass.color(triangle_ids, Load::Clear([0.0; 4]));
+    // Nobody reads the depth afterwards: the surface pass finds it more exactly.
+    let _ = pass.depth(depth, Load::Clear([0.0; 4]));
+    let scene_ids = *ids;
+    pass.record(move |ctx| draw_scene(ctx, scene, &scene_ids, &matrix, DrawTarget::Ids));
+    triangle_ids
+}
+
 /// Declares the passes that make the G-buffer.
 pub fn add_gbuffer<'f>(
     graph: &mut Graph<'f>,
@@ -31,20 +56,8 @@ pub fn add_gbuffer<'f>(
 ) -> GBuffer {
     let [width, height] = size;
     let image = |format| ImageDesc::new(format, width, height);
-    let aspect = width as f32 / height as f32;
-    let matrix = camera.view_projection_reversed(aspect);
     let pixels = PixelCamera::new(camera, size);
-
-    let triangle_ids = graph.create_image("gbuffer.ids", image(vk::Format::R32_UINT));
-    let depth = graph.create_image("gbuffer.depth", image(vk::Format::D32_SFLOAT));
-    let mut pass = graph.pass("gbuffer.ids", PassKind::Graphics);
-    read_for_draw(&mut pass, scene, ids);
-    let triangle_ids = pass.color(triangle_ids, Load::Clear([0.0; 4]));
-    // Nobody reads the depth afterwards: the surface pass finds it more exactly.
-    let _ = pass.depth(depth, Load::Clear([0.0; 4]));
-    let scene_ids = *ids;
-    pass.record(move |ctx| draw_scene(ctx, scene, &scene_ids, &matrix, DrawTarget::Ids));
-
+    let triangle_ids = add_triangle_ids(graph, scene, ids, camera, size);
     let view_depth = graph.create_image("gbuffer.view_depth", image(vk::Format::R32_SFLOAT));
     let geometric = graph.create_image("gbuffer.geometric_normal", image(vk::Format::R32_UINT));
     let shading = graph.create_image("gbuffer.shading_normal", image(vk::Format::R32_UINT));

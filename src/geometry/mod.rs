@@ -19,7 +19,7 @@ mod visible;
 
 pub use camera::{PixelCamera, frustum_sees};
 pub use draw::{DrawTarget, SceneShaders, draw_scene, draw_scene_with, read_for_draw};
-pub use gbuffer::{GBuffer, add_gbuffer};
+pub use gbuffer::{GBuffer, add_gbuffer, add_triangle_ids};
 pub use scene_buffers::{Draw, SceneBuffers, SceneIds, UploadError};
 pub use scene_layout::image_place;
 pub use tiles::{TILE_SIZE, TileList, add_tile_bounds, tile_counts};

@@ -13,7 +13,8 @@
 mod shade;
 
 pub use crate::geometry::{
-    Draw, GBuffer, PixelCamera, SceneBuffers, SceneIds, UploadError, frustum_sees, visible_hulls,
+    Draw, GBuffer, PixelCamera, SceneBuffers, SceneIds, UploadError, add_triangle_ids,
+    frustum_sees, visible_hulls,
 };
 pub use shade::{Ambient, Shading, ShadingInputs, add_shading};
 
@@ -50,24 +51,38 @@ pub struct Frame {
     pub radiance: ImageId,
 }
 
-/// Declares a picture of `size` pixels: surfaces, visibility of every light, shading.
-pub fn add_frame<'f>(
+/// What [`add_visibility`] declares.
+#[derive(Clone, Debug)]
+pub struct Visibilities {
+    /// Everything that the technique makes for each light, in their order.
+    pub masks: Vec<ShadowMask>,
+    /// Passes that make each light's visibility, by place in the order of declaration.
+    pub passes: Vec<Range<usize>>,
+    /// A uniform buffer with [`ViewParams`] of each light.
+    pub params: BufferId,
+    /// Where in it each light's are.
+    pub parts: Vec<BufferPart>,
+}
+
+/// Declares every light's visibility at the surfaces of a G-buffer of `size` pixels: that of
+/// [`add_gbuffer`], or a host's own with the same meaning. `ids` is what
+/// [`SceneBuffers::import`] returned for this graph.
+pub fn add_visibility<'f>(
     graph: &mut Graph<'f>,
-    scene: &'f SceneBuffers,
+    (scene, ids): (&'f SceneBuffers, SceneIds),
+    gbuffer: GBuffer,
     camera: &SceneCamera,
     size: [u32; 2],
     lights: &[NamedLight],
     technique: Technique,
-) -> Frame {
-    let ids = scene.import(graph);
+) -> Visibilities {
     let pixels = PixelCamera::new(camera, size);
     let (params, parts) = add_params(graph, pixels, lights);
-    let gbuffer = add_gbuffer(graph, scene, &ids, camera, size);
     let tile_bounds = add_tile_bounds(graph, &gbuffer, size);
     let boxes = scene.draws().iter().map(|draw| draw.bounds);
     let receivers = visible_hulls(camera, size, boxes);
     let mut masks = Vec::with_capacity(lights.len());
-    let mut visibility_passes = Vec::with_capacity(lights.len());
+    let mut passes = Vec::with_capacity(lights.len());
     for (light, part) in lights.iter().zip(&parts) {
         let first = graph.pass_count();
         masks.push(technique.add_passes(
@@ -84,27 +99,55 @@ pub fn add_frame<'f>(
                 ids,
             },
         ));
-        visibility_passes.push(first..graph.pass_count());
+        passes.push(first..graph.pass_count());
     }
+    Visibilities {
+        masks,
+        passes,
+        params,
+        parts,
+    }
+}
+
+/// Declares a picture of `size` pixels: surfaces, visibility of every light, shading.
+pub fn add_frame<'f>(
+    graph: &mut Graph<'f>,
+    scene: &'f SceneBuffers,
+    camera: &SceneCamera,
+    size: [u32; 2],
+    lights: &[NamedLight],
+    technique: Technique,
+) -> Frame {
+    let ids = scene.import(graph);
+    let gbuffer = add_gbuffer(graph, scene, &ids, camera, size);
+    let found = add_visibility(
+        graph,
+        (scene, ids),
+        gbuffer,
+        camera,
+        size,
+        lights,
+        technique,
+    );
     let shading = add_shading(
         graph,
         &ShadingInputs {
             scene,
             ids: &ids,
             gbuffer: &gbuffer,
-            camera: pixels,
+            camera: PixelCamera::new(camera, size),
             lights,
-            masks: &masks,
-            params,
-            parts: &parts,
+            masks: &found.masks,
+            params: found.params,
+            parts: &found.parts,
             ambient: Ambient::of(lights, scene.bounds()),
         },
     );
     Frame {
         gbuffer,
-        visibility: masks.iter().map(|mask| mask.visibility).collect(),
-        masks,
-        visibility_passes,
+        visibility: found.masks.iter().map(|mask| mask.visibility).collect(),
+        masks: found.masks,
+        visibility_passes: found.passes,
         albedo: shading.albedo,
         radiance: shading.radiance,
     }

@@ -174,6 +174,7 @@ mod tests {
             first_index,
             index_count,
             bounds: Aabb::EMPTY,
+            corners: [glam::Vec3::ZERO; 8],
             mask,
         };
         let run = |first_index, index_count, mask| Run {

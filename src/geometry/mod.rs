@@ -14,6 +14,7 @@ mod gbuffer;
 mod hierarchy;
 mod scene_buffers;
 mod scene_layout;
+mod tight_box;
 mod tiles;
 mod visible;
 
@@ -22,5 +23,6 @@ pub use draw::{DrawTarget, SceneShaders, draw_scene, draw_scene_with, read_for_d
 pub use gbuffer::{GBuffer, add_gbuffer, add_triangle_ids};
 pub use scene_buffers::{Draw, SceneBuffers, SceneIds, UploadError};
 pub use scene_layout::image_place;
+pub use tight_box::tight_box;
 pub use tiles::{TILE_SIZE, TileList, add_tile_bounds, tile_counts};
 pub use visible::visible_hulls;

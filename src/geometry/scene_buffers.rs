@@ -12,6 +12,7 @@ use crate::graph::{
 };
 use crate::scene::{Aabb, Scene};
 use ash::vk;
+use glam::Vec3;
 
 /// Why a scene cannot be brought to the device.
 #[derive(Debug, thiserror::Error)]
@@ -60,6 +61,8 @@ pub struct Draw {
     pub index_count: u32,
     /// Box around its vertices, scene space.
     pub bounds: Aabb,
+    /// Corners of a box around them that turns with them: [`tight_box`](super::tight_box).
+    pub corners: [Vec3; 8],
     /// The material that cuts holes into it; `None` for solid triangles.
     pub mask: Option<u32>,
 }

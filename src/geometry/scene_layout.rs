@@ -1,6 +1,7 @@
 //! A scene laid out for the device, before it is there.
 
 use super::scene_buffers::Draw;
+use super::tight_box::tight_box;
 use crate::scene::{Aabb, Material, Primitive, Scene, Wrap};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
@@ -176,12 +177,14 @@ impl Layout {
         let uv = |corner: usize| primitive.uvs.get(corner).map_or([0.0; 2], Vec2::to_array);
         let first_index = self.indices.len();
         let mut bounds = Aabb::EMPTY;
+        let mut drawn = Vec::with_capacity(triangles.len());
         for corners in triangles {
             let points = corners.map(|corner| primitive.positions[corner]);
             let Some(normal) = unit_normal(points) else {
                 continue;
             };
             points.iter().for_each(|point| bounds.insert(*point));
+            drawn.push(points);
             let triangle = (self.indices.len() / 3) as u32;
             let indices = self.own_first_vertex(first_vertex, *corners, points[0], triangle);
             if self.mask_uvs.len() < self.vertices.len() && kind == Kind::Masked {
@@ -207,6 +210,7 @@ impl Layout {
             first_index: first_index as u32,
             index_count: (self.indices.len() - first_index) as u32,
             bounds,
+            corners: tight_box(&drawn),
             mask: (kind == Kind::Masked).then_some(primitive.material as u32),
         });
     }

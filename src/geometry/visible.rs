@@ -1,7 +1,7 @@
 //! What part of a scene a camera can see, as convex hulls.
 
-use crate::scene::{Aabb, SceneCamera};
-use glam::DVec3;
+use crate::scene::SceneCamera;
+use glam::{DVec3, Vec3};
 
 /// A half-space: points with `dot(normal, p) <= offset`.
 #[derive(Clone, Copy, Debug)]
@@ -16,20 +16,20 @@ impl HalfSpace {
     }
 }
 
-/// The parts of boxes that lie in a camera's frustum (without far plane), as points whose convex
+/// The parts of boxes, given by their corners (x changing fastest, then y), that lie in a camera's frustum (without far plane), as points whose convex
 /// hull holds them; none for a box out of view. Scene space, metres.
 pub fn visible_hulls(
     camera: &SceneCamera,
     size: [u32; 2],
-    boxes: impl IntoIterator<Item = Aabb>,
+    boxes: impl IntoIterator<Item = [Vec3; 8]>,
 ) -> Vec<Vec<DVec3>> {
     let planes = frustum(camera, size);
     boxes
         .into_iter()
-        .filter(|bounds| !bounds.is_empty())
-        .map(|bounds| {
+        .filter(|corners| corners.iter().all(|corner| corner.is_finite()))
+        .map(|corners| {
             // Most boxes of a scene are wholly in view or wholly out of it.
-            let corners = bounds.corners().map(|corner| corner.as_dvec3());
+            let corners = corners.map(|corner| corner.as_dvec3());
             let beyond = |plane: &HalfSpace| corners.iter().all(|c| plane.distance(*c) > 0.0);
             let within = |plane: &HalfSpace| corners.iter().all(|c| plane.distance(*c) <= 0.0);
             if planes.iter().any(beyond) {
@@ -38,7 +38,7 @@ pub fn visible_hulls(
             if planes.iter().all(within) {
                 return corners.to_vec();
             }
-            let mut faces = box_faces(&bounds);
+            let mut faces = box_faces(&corners);
             for plane in &planes {
                 clip(&mut faces, plane);
             }
@@ -72,8 +72,7 @@ fn frustum(camera: &SceneCamera, size: [u32; 2]) -> [HalfSpace; 5] {
 }
 
 /// The six faces of a box as polygons.
-fn box_faces(bounds: &Aabb) -> Vec<Vec<DVec3>> {
-    let corners = bounds.corners().map(|corner| corner.as_dvec3());
+fn box_faces(corners: &[DVec3; 8]) -> Vec<Vec<DVec3>> {
     let faces = [
         [0, 1, 3, 2],
         [4, 5, 7, 6],
@@ -127,7 +126,7 @@ fn in_order(mut points: Vec<DVec3>, normal: DVec3) -> Option<Vec<DVec3>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
+    use crate::scene::Aabb;
 
     fn camera() -> SceneCamera {
         SceneCamera {
@@ -151,7 +150,7 @@ mod tests {
             min: Vec3::new(-1.0, -1.0, 6.0),
             max: Vec3::new(1.0, 1.0, 8.0),
         };
-        let hulls = visible_hulls(&camera(), [64, 64], [inside, behind]);
+        let hulls = visible_hulls(&camera(), [64, 64], [inside, behind].map(|b| b.corners()));
         assert_eq!(hulls.len(), 1);
         for corner in inside.corners() {
             assert!(hulls[0].contains(&corner.as_dvec3()));
@@ -166,7 +165,7 @@ mod tests {
             min: Vec3::new(-100.0, -1.2, -100.0),
             max: Vec3::new(100.0, -1.0, 100.0),
         };
-        let hulls = visible_hulls(&camera(), [64, 64], [floor]);
+        let hulls = visible_hulls(&camera(), [64, 64], [floor.corners()]);
         let points = &hulls[0];
         let planes = frustum(&camera(), [64, 64]);
         for point in points {

@@ -79,7 +79,7 @@ pub fn add_visibility<'f>(
     let pixels = PixelCamera::new(camera, size);
     let (params, parts) = add_params(graph, pixels, lights);
     let tile_bounds = add_tile_bounds(graph, &gbuffer, size);
-    let boxes = scene.draws().iter().map(|draw| draw.bounds);
+    let boxes = scene.draws().iter().map(|draw| draw.corners);
     let receivers = visible_hulls(camera, size, boxes);
     let mut masks = Vec::with_capacity(lights.len());
     let mut passes = Vec::with_capacity(lights.len());
@@ -129,11 +129,48 @@ pub fn add_frame<'f>(
         lights,
         technique,
     );
+    shaded(graph, (scene, &ids), gbuffer, camera, lights, found)
+}
+
+/// As [`add_frame`], with what a technique made of the lights in an earlier frame, in which camera,
+/// lights and scene were the same: no pass of a technique is declared. `masks` are images of this
+/// graph, one for each light.
+pub fn add_frame_with_masks<'f>(
+    graph: &mut Graph<'f>,
+    scene: &'f SceneBuffers,
+    camera: &SceneCamera,
+    size: [u32; 2],
+    lights: &[NamedLight],
+    masks: Vec<ShadowMask>,
+) -> Frame {
+    let ids = scene.import(graph);
+    let gbuffer = add_gbuffer(graph, scene, &ids, camera, size);
+    let (params, parts) = add_params(graph, PixelCamera::new(camera, size), lights);
+    let none = graph.pass_count();
+    let found = Visibilities {
+        passes: vec![none..none; masks.len()],
+        masks,
+        params,
+        parts,
+    };
+    shaded(graph, (scene, &ids), gbuffer, camera, lights, found)
+}
+
+fn shaded<'f>(
+    graph: &mut Graph<'f>,
+    (scene, ids): (&'f SceneBuffers, &SceneIds),
+    gbuffer: GBuffer,
+    camera: &SceneCamera,
+    lights: &[NamedLight],
+    found: Visibilities,
+) -> Frame {
+    let size = graph.image_desc(gbuffer.view_depth);
+    let size = size.map_or([1, 1], |desc| [desc.width, desc.height]);
     let shading = add_shading(
         graph,
         &ShadingInputs {
             scene,
-            ids: &ids,
+            ids,
             gbuffer: &gbuffer,
             camera: PixelCamera::new(camera, size),
             lights,

@@ -58,7 +58,7 @@ pub(super) fn add_passes<'f>(
         .scene
         .draws()
         .iter()
-        .map(|draw| draw.bounds)
+        .map(|draw| draw.corners)
         .collect();
     let views = views::sliced_views(&inputs.light, &inputs.receivers, &boxes, &options);
     let sliced: Vec<_> = views

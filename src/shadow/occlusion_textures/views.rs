@@ -2,9 +2,8 @@
 
 use super::options::{OcclusionOptions, Planes, Projection};
 use crate::light::{AreaLight, LightShape};
-use crate::scene::Aabb;
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat4, DVec3, DVec4, Mat4};
+use glam::{DMat4, DVec3, DVec4, Mat4, Vec3};
 
 /// `OcclusionView` in `occlusion_textures/params.glsl`.
 #[repr(C)]
@@ -71,11 +70,11 @@ impl Frame {
 }
 
 /// The views of a light; none where it has nothing to look at. `receivers` are hulls of all surfaces
-/// that need its visibility, `casters` boxes around all triangles.
+/// that need its visibility, `casters` corners of boxes around all triangles.
 pub(super) fn sliced_views(
     light: &AreaLight,
     receivers: &[Vec<DVec3>],
-    casters: &[Aabb],
+    casters: &[[Vec3; 8]],
     options: &OcclusionOptions,
 ) -> Vec<SlicedView> {
     let points: Vec<DVec3> = receivers.iter().flatten().copied().collect();
@@ -204,7 +203,7 @@ fn sun_view(
     light: &AreaLight,
     frame: Frame,
     points: &[DVec3],
-    casters: &[Aabb],
+    casters: &[[Vec3; 8]],
     options: &OcclusionOptions,
 ) -> SlicedView {
     let LightShape::Sun { angular_diameter } = light.shape else {
@@ -254,7 +253,7 @@ fn local_view(
     light: &AreaLight,
     frame: Frame,
     receivers: &[DVec3],
-    casters: &[Aabb],
+    casters: &[[Vec3; 8]],
     options: &OcclusionOptions,
     slope: f64,
 ) -> Option<SlicedView> {
@@ -411,11 +410,13 @@ fn offset_of(
     (fit < 1.0e3 * far).then_some(fit.max(least))
 }
 
-fn local_boxes(casters: &[Aabb], of: impl Fn(DVec3) -> DVec3) -> Vec<(DVec3, DVec3)> {
-    let solid = casters.iter().filter(|bounds| !bounds.is_empty());
+fn local_boxes(casters: &[[Vec3; 8]], of: impl Fn(DVec3) -> DVec3) -> Vec<(DVec3, DVec3)> {
+    let solid = casters
+        .iter()
+        .filter(|corners| corners.iter().all(|corner| corner.is_finite()));
     solid
-        .map(|bounds| {
-            let corners = bounds.corners().map(|corner| of(corner.as_dvec3()));
+        .map(|corners| {
+            let corners = corners.map(|corner| of(corner.as_dvec3()));
             let low = corners.iter().fold(DVec3::INFINITY, |a, c| a.min(*c));
             let high = corners.iter().fold(DVec3::NEG_INFINITY, |a, c| a.max(*c));
             (low, high)

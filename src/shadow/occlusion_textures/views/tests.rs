@@ -1,5 +1,6 @@
 use super::*;
-use glam::{Vec3, Vec4};
+use crate::scene::Aabb;
+use glam::Vec4;
 
 fn light(shape: LightShape) -> AreaLight {
     AreaLight::new(shape, Vec3::new(1.0, 10.0, 2.0), Vec3::NEG_Y, Vec3::X)
@@ -12,12 +13,16 @@ fn cube(center: Vec3, half: f32) -> Aabb {
     }
 }
 
+fn corners(boxes: &[Aabb]) -> Vec<[Vec3; 8]> {
+    boxes.iter().map(Aabb::corners).collect()
+}
+
 fn views_of(shape: LightShape, boxes: &[Aabb], options: &OcclusionOptions) -> Vec<SlicedView> {
     let hulls: Vec<Vec<DVec3>> = boxes
         .iter()
         .map(|b| b.corners().map(|c| c.as_dvec3()).to_vec())
         .collect();
-    sliced_views(&light(shape), &hulls, boxes, options)
+    sliced_views(&light(shape), &hulls, &corners(boxes), options)
 }
 
 const RECT: LightShape = LightShape::Rect {

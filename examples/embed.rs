@@ -24,7 +24,7 @@ use antumbra::renderer::{GBuffer, NamedLight, SceneBuffers, add_triangle_ids, ad
 use antumbra::scene::{Aabb, Material, Primitive, Scene, SceneCamera};
 use antumbra::shadow::Technique;
 use glam::Vec3;
-use host::{Host, Image, extent_3d};
+use host::{Host, Image};
 use passes::Passes;
 
 const SIZE: u32 = 384;
@@ -187,39 +187,12 @@ fn record(
         technique,
     );
 
-    // A pass of the host's own within the graph: raw commands, with the barriers done.
+    // Into the host's image; a pass of the host's own could as well read `visibility` itself.
     let visibility = found.masks[0].visibility;
     let mut pass = graph.pass("host.copy", PassKind::Transfer);
     pass.read(visibility, Access::CopyRead);
     let mask = pass.overwrite(mask, Access::CopyWrite);
-    pass.record(move |ctx| {
-        let layers = vk::ImageSubresourceLayers {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            layer_count: 1,
-            ..Default::default()
-        };
-        let region = vk::ImageCopy::default()
-            .src_subresource(layers)
-            .dst_subresource(layers)
-            .extent(extent_3d());
-        let (from, to, cmd) = (
-            ctx.image(visibility)?,
-            ctx.image(mask)?,
-            ctx.command_buffer(),
-        );
-        // SAFETY: both images are alive, of this size and in these layouts by the pass's accesses.
-        unsafe {
-            ctx.gpu().device().cmd_copy_image(
-                cmd,
-                from,
-                vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
-                to,
-                vk::ImageLayout::TRANSFER_DST_OPTIMAL,
-                &[region],
-            );
-        }
-        Ok(())
-    });
+    pass.record(move |ctx| ctx.copy_image(visibility, mask));
     graph.compile(gpu)?.record(gpu, cache, cmd)?;
     Ok(())
 }

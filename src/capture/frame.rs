@@ -1,9 +1,12 @@
 //! What frames are asked for and what comes back.
 
 use super::dump::CapturedImage;
+use super::kept::KeptMasks;
 use crate::gpu::GpuError;
 use crate::graph::{FakeMemory, FrameReport, Graph, GraphError, Plan};
-use crate::renderer::{Frame, NamedLight, SceneBuffers, UploadError, add_frame};
+use crate::renderer::{
+    Frame, NamedLight, SceneBuffers, UploadError, add_frame, add_frame_with_masks,
+};
 use crate::scene::{Scene, SceneCamera};
 use crate::shadow::{Technique, TechniqueError};
 use ash::vk;
@@ -130,7 +133,7 @@ pub fn plan_frame(scene: &Scene, request: &FrameRequest) -> Result<Plan, Capture
     let lights = check(scene, request, 16384)?;
     let buffers = SceneBuffers::plan_only(scene);
     let mut graph = Graph::new();
-    let frame = declare(&mut graph, &buffers, request, &lights);
+    let frame = declare(&mut graph, &buffers, request, &lights, None);
     graph.keep(frame.radiance);
     for visibility in frame.visibility {
         graph.keep(visibility);
@@ -190,20 +193,20 @@ pub(super) fn check(
     lights.collect()
 }
 
-/// Declares the frame.
+/// Declares the frame, with the masks of an earlier one if there are any that fit.
 pub(super) fn declare<'f>(
     graph: &mut Graph<'f>,
     buffers: &'f SceneBuffers,
     request: &FrameRequest,
     lights: &[NamedLight],
+    kept: Option<&KeptMasks>,
 ) -> Frame {
-    let camera = &request.camera;
-    add_frame(
-        graph,
-        buffers,
-        camera,
-        request.size,
-        lights,
-        request.technique,
-    )
+    let (camera, size) = (&request.camera, request.size);
+    match kept {
+        Some(kept) => {
+            let masks = kept.import(graph);
+            add_frame_with_masks(graph, buffers, camera, size, lights, masks)
+        }
+        None => add_frame(graph, buffers, camera, size, lights, request.technique),
+    }
 }

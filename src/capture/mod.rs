@@ -2,6 +2,7 @@
 
 mod dump;
 mod frame;
+mod kept;
 mod render;
 
 #[cfg(feature = "cli")]

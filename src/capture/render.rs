@@ -2,6 +2,7 @@
 
 use super::dump::{CapturedImage, Dump, Source};
 use super::frame::{CaptureError, CapturedFrame, CapturedLight, FrameRequest, check, declare};
+use super::kept::KeptMasks;
 use crate::gpu::{Buffer, Gpu, GpuError, MemoryLocation, ValidationMessage};
 use crate::graph::{
     Access, BufferDesc, BufferPart, BufferState, FrameCache, FrameReport, Graph, HostBuffer,
@@ -23,6 +24,7 @@ pub struct FrameRenderer<'s> {
     scene: Cow<'s, Scene>,
     buffers: SceneBuffers,
     cache: FrameCache,
+    kept: Option<KeptMasks>,
 }
 
 impl<'s> FrameRenderer<'s> {
@@ -38,6 +40,7 @@ impl<'s> FrameRenderer<'s> {
                 scene,
                 buffers,
                 cache: FrameCache::new(),
+                kept: None,
             }),
             Err(error) => {
                 if let Err(second) = gpu.destroy() {
@@ -68,6 +71,9 @@ impl<'s> FrameRenderer<'s> {
             // `run` has waited: no frame uses the old ones any more.
             std::mem::replace(&mut self.buffers, buffers).destroy(&mut self.gpu);
         }
+        if !same || self.scene.lights != scene.lights {
+            self.forget_kept();
+        }
         self.scene = Cow::Owned(scene);
         Ok(!same)
     }
@@ -90,13 +96,46 @@ impl<'s> FrameRenderer<'s> {
         request: &FrameRequest,
         names: &[&str],
     ) -> Result<CapturedFrame, CaptureError> {
+        self.render_one(request, names, false)
+    }
+
+    /// As [`render`](Self::render), but what the technique made is kept, and used again while scene
+    /// and request stay as they are: such a frame has no pass of the technique. Its counter
+    /// `masks_kept` says for how many lights that was so.
+    pub fn render_static(&mut self, request: &FrameRequest) -> Result<CapturedFrame, CaptureError> {
+        self.render_one(request, &[], true)
+    }
+
+    /// `run` has waited: nobody uses them any more.
+    fn forget_kept(&mut self) {
+        if let Some(kept) = self.kept.take() {
+            kept.destroy(&mut self.gpu);
+        }
+    }
+
+    fn render_one(
+        &mut self,
+        request: &FrameRequest,
+        names: &[&str],
+        reuse: bool,
+    ) -> Result<CapturedFrame, CaptureError> {
         let most = self.gpu.info().limits.max_image_dimension2_d;
         let lights = check(&self.scene, request, most)?;
 
         let start = Instant::now();
         let pipelines = self.gpu.pipelines_created();
         let mut graph = Graph::continuing(self.cache.history());
-        let frame = declare(&mut graph, &self.buffers, request, &lights);
+        let kept = self.kept.as_ref().filter(|kept| reuse && kept.fit(request));
+        let masks_kept = kept.map_or(0, |_| lights.len());
+        let frame = declare(&mut graph, &self.buffers, request, &lights, kept);
+        if reuse && masks_kept == 0 {
+            if let Some(old) = self.kept.take() {
+                old.destroy(&mut self.gpu);
+            }
+            let kept = KeptMasks::new(&mut self.gpu, request, &frame.masks)?;
+            kept.fill(&mut graph, &frame.masks);
+            self.kept = Some(kept);
+        }
         let wanted = ReadBacks::new(&graph, &frame, request, names)?;
         let aside = Instant::now();
         let (usage, location) = (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu);
@@ -120,7 +159,7 @@ impl<'s> FrameRenderer<'s> {
                 color: wanted.take(0, bytes),
                 lights: wanted.lights(request, &frame, &plan, bytes),
                 images: wanted.images(bytes),
-                counters: self.counters(&plan, &report, created),
+                counters: self.counters(&plan, &report, created, masks_kept),
                 passes,
                 frame_ms: (total_ms - aside_ms - copies_ms).max(0.0),
                 plan,
@@ -128,6 +167,9 @@ impl<'s> FrameRenderer<'s> {
             }
         });
         self.gpu.destroy_buffer(target);
+        if result.is_err() {
+            self.forget_kept();
+        }
         result
     }
 
@@ -136,10 +178,12 @@ impl<'s> FrameRenderer<'s> {
         plan: &Plan,
         report: &FrameReport,
         pipelines: usize,
+        masks_kept: usize,
     ) -> BTreeMap<String, u64> {
         let counts = [
             ("barriers", report.barriers as u64),
             ("edges", self.buffers.edge_count() as u64),
+            ("masks_kept", masks_kept as u64),
             ("passes", report.passes.len() as u64),
             ("passes_culled", plan.culled.len() as u64),
             ("pipelines_created", pipelines as u64),
@@ -161,6 +205,7 @@ impl<'s> FrameRenderer<'s> {
 
     /// Gives everything back; returns what the validation layer said, leaks included.
     pub fn destroy(mut self) -> Result<Vec<ValidationMessage>, GpuError> {
+        self.forget_kept();
         self.cache.destroy(&mut self.gpu);
         self.buffers.destroy(&mut self.gpu);
         self.gpu.destroy()

@@ -5,8 +5,8 @@
 //! `visibility_ms` adds up the passes that make one light's visibility, frame by frame. A pass that
 //! was left out has `gpu_ms` 0 and the reason in `skipped`. `setup_ms.load` is reading the scene
 //! and uploading it; `setup_ms.pipelines` is `null`, because pipelines are made while the first
-//! frame is recorded and count in `setup_ms.first_frame`. `frame_ms_static` is `null`, because no
-//! frame reuses anything of an earlier one.
+//! frame is recorded and count in `setup_ms.first_frame`. `frame_ms_static` is `frame_ms` of frames
+//! that use again what the technique made in an earlier one.
 
 use std::collections::BTreeMap;
 

@@ -80,6 +80,7 @@ pub(super) struct Shot {
     pub(super) seconds: f64,
     pub(super) captured: CapturedFrame,
     pub(super) measured: Measurements,
+    measured_static: Measurements,
     pub(super) is_measured: bool,
     pub(super) setup: SetupTimes,
     /// The frame's lights, in the order of the captured ones.
@@ -99,6 +100,7 @@ impl Shot {
         let mut captured = renderer.render_with_images(request, &plan.dumps)?;
         let first_frame = captured.frame_ms;
         let mut measured = Measurements::default();
+        let mut measured_static = Measurements::default();
         match plan.repeats {
             None => measured.add(&captured),
             Some((warm_up, count)) => {
@@ -111,6 +113,11 @@ impl Shot {
                     }
                 }
                 captured.images = images;
+                // The first of them makes what the others keep.
+                renderer.render_static(request)?;
+                for _ in 0..count {
+                    measured_static.add(&renderer.render_static(request)?);
+                }
             }
         }
         let memory = renderer.gpu().memory_use();
@@ -120,6 +127,7 @@ impl Shot {
             number: plan.number,
             seconds: plan.seconds,
             measured,
+            measured_static,
             is_measured: plan.repeats.is_some(),
             setup: SetupTimes {
                 load: plan.load_ms,
@@ -163,7 +171,7 @@ impl Shot {
             width: frame.size[0],
             height: frame.size[1],
             frame_ms: measured.frame(),
-            frame_ms_static: None,
+            frame_ms_static: self.measured_static.frame(),
             visibility_ms: measured.sum_of(&light.passes),
             passes: measured.passes(frame),
             setup_ms: self.setup,

@@ -278,6 +278,43 @@ impl PassContext<'_> {
         Ok(())
     }
 
+    /// Copies an image of one mip level and layer to another of the same size.
+    pub fn copy_image(&mut self, from: ImageId, to: ImageId) -> Result<(), GpuError> {
+        let source = self.find(from.0.resource, None, |a| a == Access::CopyRead)?;
+        let target = self.find(to.0.resource, None, |a| a == Access::CopyWrite)?;
+        let sizes = [source, target].map(|used| {
+            let desc = self.image_desc(used.resource);
+            desc.map(|desc| [desc.width, desc.height])
+        });
+        let [Some([width, height]), Some(other)] = sizes else {
+            return Err(misuse(self.pass, "copies no image".to_string()));
+        };
+        if [width, height] != other {
+            let problem = format!("copies {width}x{height} texels into {other:?}");
+            return Err(misuse(self.pass, problem));
+        }
+        let layers = vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            layer_count: 1,
+            ..Default::default()
+        };
+        let region = vk::ImageCopy::default()
+            .src_subresource(layers)
+            .dst_subresource(layers)
+            .extent(vk::Extent3D {
+                width,
+                height,
+                depth: 1,
+            });
+        let [from, to] = [source, target].map(|used| self.handles.images[used.resource]);
+        let before = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+        let after = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+        let device = self.gpu.device();
+        // SAFETY: `cmd` is recording outside rendering; both were declared for the copy.
+        unsafe { device.cmd_copy_image(self.cmd, from, before, to, after, &[region]) };
+        Ok(())
+    }
+
     /// Copies bytes from one buffer to another.
     pub fn copy_buffer(
         &mut self,

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Everything a change must pass: format, lints, tests, documentation, and the GPU tests on each software driver at hand.
-# Runs all steps even after one fails, lists them with their durations, and fails if one did.
+# Runs all steps even after one fails, lists them with their durations, and fails if one did. GPU tests run in two processes
+# at a time, each of which runs its tests one by one.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -25,7 +26,7 @@ for file in tests/*.rs tests/*/main.rs; do
     name=${name%.rs}
     name=${name%/main}
     case $name in
-        capture_stress) ;; # see gpu_step
+        capture_stress) ;; # see gpu_jobs
         gpu_* | shader_* | capture* | cli* | embed* | host* | golden*) gpu_tests+=(--test "$name") ;;
         *) other_tests+=(--test "$name") ;;
     esac
@@ -45,11 +46,49 @@ step() {
     summary+=("$(printf '%-6s %5d s  %s' "$verdict" $((SECONDS - begin)) "$name")")
     printf '%s\n' "--- ${summary[-1]}"
 }
-gpu_step() {
+
+# Much of a GPU test is one thread's work (compiling pipelines, validation, rays of the truth), so two
+# processes at a time finish sooner than one. What they print comes out whole, when a job is done.
+jobs_dir=$(mktemp -d)
+trap 'rm -rf "$jobs_dir"' EXIT
+job_names=()
+job_pids=()
+next_shown=0
+start_job() {
+    while [ "$(jobs -rp | wc -l)" -ge 2 ]; do wait -n || true; done
+    local name=$1 base=$jobs_dir/${#job_names[@]}
+    shift
+    job_names+=("$name")
+    printf '\n==> %s: begun\n' "$name"
+    (
+        begin=$SECONDS
+        code=0
+        "$@" >"$base.log" 2>&1 || code=$?
+        echo "$code $((SECONDS - begin))" >"$base.result"
+    ) &
+    job_pids+=($!)
+}
+show_jobs() {
+    local code seconds verdict
+    for ((; next_shown < ${#job_names[@]}; next_shown++)); do
+        wait "${job_pids[next_shown]}" || true
+        read -r code seconds <"$jobs_dir/$next_shown.result" || { code=1 seconds=0; }
+        verdict=ok
+        if [ "$code" != 0 ]; then
+            verdict=FAILED
+            failed=1
+        fi
+        printf '\n==> %s\n' "${job_names[next_shown]}"
+        cat "$jobs_dir/$next_shown.log"
+        summary+=("$(printf '%-6s %5d s  %s' "$verdict" "$seconds" "${job_names[next_shown]}")")
+        printf '%s\n' "--- ${summary[-1]}"
+    done
+}
+gpu_jobs() {
     if [ ${#gpu_tests[@]} -eq 0 ]; then return; fi
-    step "GPU tests on $1" cargo test "${gpu_tests[@]}" -- --test-threads=1
+    start_job "GPU tests on $1" cargo test "${gpu_tests[@]}" -- --test-threads=1
     # All relations over all stress scenes take minutes: once, and elsewhere each scene by itself.
-    step "stress scenes on $1" cargo test --test capture_stress -- --test-threads=1 "${@:2}"
+    start_job "stress scenes on $1" cargo test --test capture_stress -- --test-threads=1 "${@:2}"
 }
 
 step "format" cargo fmt --check
@@ -59,12 +98,14 @@ step "unit and graph tests" cargo test --lib --bins --examples "${other_tests[@]
 step "documentation examples" cargo test --doc
 step "documentation" env RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
 
-gpu_step "the system's lavapipe"
+step "build of the GPU tests" cargo test --no-run "${gpu_tests[@]}" --test capture_stress
+gpu_jobs "the system's lavapipe"
 for driver in lavapipe swiftshader; do
     if [ ! -f ".deps/vulkan/$driver/version" ]; then continue; fi
     use_driver "$PWD/.deps/vulkan/$driver/icd.json"
-    gpu_step "$driver of $(cat ".deps/vulkan/$driver/version")" every_case
+    gpu_jobs "$driver of $(cat ".deps/vulkan/$driver/version")" every_case
 done
+show_jobs
 
 printf '\n'
 printf '%s\n' "${summary[@]}"

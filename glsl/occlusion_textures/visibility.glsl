@@ -134,8 +134,9 @@ float own_depth(Receiver at, vec2 u) {
     return under != 0.0 ? over / under : at.v.z;
 }
 
-// The least depth of the receiver's own plane within a texel of a kernel's middle. Elsewhere in the
-// kernel it is below the texture, but where the light is partly below the horizon.
+// The least depth of the receiver's own plane that the smallest kernel can find: it is half a texel
+// wide to each side, and of a texel that it cuts all bits count. Elsewhere in a larger kernel the
+// plane is below the texture, but where the light is partly below the horizon.
 float own_nearest(Receiver at, Kernel kernel) {
     vec2 corner = vec2(slice_view.right.w, slice_view.up.w);
     vec2 texel = 1.0 / (slice_view.scale.xy * at.side);
@@ -143,7 +144,7 @@ float own_nearest(Receiver at, Kernel kernel) {
     float own = own_depth(at, u);
     float apart = abs(own_depth(at, u + vec2(texel.x, 0.0)) - own)
         + abs(own_depth(at, u + vec2(0.0, texel.y)) - own);
-    return min(own, at.v.z) - apart;
+    return min(own, at.v.z) - apart * (1.5 - 0.5 / DETAIL);
 }
 
 // Whether a ray from the receiver to a place of the light (-1 to 1 across) hits what a fine slice

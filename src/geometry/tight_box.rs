@@ -25,7 +25,8 @@ pub fn tight_box(triangles: &[[Vec3; 3]]) -> [Vec3; 8] {
         (low, high) = (low.min(at), high.max(at));
     }
     let surface = |size: DVec3| size.x * size.y + size.y * size.z + size.z * size.x;
-    if surface(high - low) >= surface(bounds.size().as_dvec3()) {
+    // Rounding must not choose between boxes that are as good as each other.
+    if surface(high - low) >= 0.999 * surface(bounds.size().as_dvec3()) {
         return upright;
     }
     let rounding =

@@ -67,19 +67,34 @@ pub fn limits(technique: Technique) -> Limits {
             jumps: 0.005,
             jump: 0.25,
         },
+        // Measured at these pictures' 512 texels: boxes that turn with the scene fit nearly the same
+        // views, and the rest is where texels and slices fall on edges. Beside the walls of a room the
+        // slice that holds them cannot tell them from blockers.
+        "occlusion-textures" => Limits {
+            step: 1.0 / 32.0,
+            fine: 0.001,
+            own_walls: 0.002,
+            turned: 0.04,
+            turned_mean: 0.01,
+            brighter: 0.0005,
+            jumps: 0.001,
+            jump: 0.25,
+        },
         other => panic!("state the limits of technique `{other}` in {}", file!()),
     }
 }
 
+/// The most light that a technique lets out of a closed mesh. A surface that leans across the slices of
+/// `occlusion-textures` leaves a little between one slice's part of it and the next one's.
+pub fn leak(technique: Technique) -> f32 {
+    match technique.name() {
+        "occlusion-textures" => 0.035,
+        _ => 0.0,
+    }
+}
+
 /// Techniques that are not finished, and not tested here before they are.
-const IN_WORK: [&str; 6] = [
-    "ssoc",
-    "occlusion-textures",
-    "oess",
-    "mdi",
-    "dbuffer",
-    "shaft-masks",
-];
+const IN_WORK: [&str; 5] = ["ssoc", "oess", "mdi", "dbuffer", "shaft-masks"];
 
 /// All techniques that must hold.
 pub fn finished() -> impl Iterator<Item = Technique> {

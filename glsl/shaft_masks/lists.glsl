@@ -1,8 +1,10 @@
-// Lists of the triangles that meet a tile's shaft: chunks of a pool, linked, so that a list may have
-// any length. Where the pool is used up, or a walk long, a list says from which node on it does not
-// know.
+// What is between a tile's surfaces and the light.
 //
-// A long list is worked on in tasks of a fixed number of chunks. The first one is its tile's; the
+// The walk down the hierarchy lists candidates: chunks of a pool, linked, so that a list may have any
+// length. Where the pool is used up, or a walk long, a list says from which node on it does not know.
+// Entries for the masks are made from candidates and lie side by side.
+//
+// A long list is worked on in tasks of a fixed number of triangles. The first one is its tile's; the
 // others OR what they find to the tile's masks in memory. What a list does not know is found again
 // in the hierarchy, by tasks of a fixed number of nodes. That spreads the work, and a software
 // driver may end loops that go on for long.
@@ -11,21 +13,35 @@
 
 #include "common/triangles.glsl"
 
-// Entries of a chunk; the one after them is the number of the list's next chunk.
+// Entries of a chunk of candidates; the one after them is the number of the list's next chunk.
 const uint CHUNK = 31u;
 
-layout(constant_id = 4) const uint TASK_CHUNKS = 16u;
-const uint TASK_ENTRIES = TASK_CHUNKS * CHUNK;
+layout(constant_id = 4) const uint TASK_ENTRIES = 512u;
 
-struct TriangleList {
-    uint chunk;  // the first
-    uint count;  // of entries
-    uint resume; // node from which on triangles are missing
-};
-
-// What a list is for, in its last channel.
+// Texels of a tile in the image of lists, side by side: first chunk of candidates, their number, node
+// from which on they are missing, state; entries as below.
+const uint LIST_TEXELS = 3u;
 const uint TILE_OPEN = 0u;
 const uint TILE_SETTLED = 1u;
+
+// Entries of a tile. Triangles lie in one run of their pool, whole ones from its begin, others from
+// its end.
+struct Entries {
+    uint first_edge;
+    uint edges;
+    uint first;  // of the run
+    uint room;   // of the run
+    uint whole;  // triangles between all surfaces and the light's plane
+    uint others; // triangles that are not, or have holes
+};
+
+Entries entries_of(uvec4 first, uvec4 second) {
+    return Entries(first.x, first.y, first.z, first.w, second.x, second.y);
+}
+
+ivec2 list_place(uvec2 tile) {
+    return ivec2(tile.x * LIST_TEXELS, tile.y);
+}
 
 ivec2 task_place(uint task) {
     return triangle_texel_place(task);
@@ -34,5 +50,13 @@ ivec2 task_place(uint task) {
 ivec2 chunk_entry_place(uint chunk, uint entry) {
     return triangle_texel_place(chunk * (CHUNK + 1u) + entry);
 }
+
+// An edge in its pool: a triangle, the corner that it begins at, and which way it counts.
+const uint EDGE_CORNER_BITS = 2u;
+const uint EDGE_DOUBLE = 0x40000000u;
+const uint EDGE_TURNED = 0x80000000u;
+
+// Most that edges of one tile may count in sum: masks count in bytes, half of the edges up.
+const uint MOST_COUNT = 480u;
 
 #endif

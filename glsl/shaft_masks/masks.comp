@@ -1,6 +1,7 @@
 #version 460
 // Masks of the listed tiles, of tasks on the rest of long lists, or of runs of nodes that lists do not
-// know: a workgroup each, four pixels an invocation, so that each fetch of a triangle serves four.
+// know: a workgroup each, and of each block of samples. Four pixels an invocation, so that each fetch of an
+// edge or a triangle serves four.
 
 #include "common/camera.glsl"
 #include "common/tiles.glsl"
@@ -8,6 +9,12 @@
 #include "shaft_masks/params.glsl"
 
 layout(local_size_x = 8, local_size_y = 2) in;
+
+// The step: one of those below. A pipeline each, because each has code of its own.
+layout(constant_id = 1) const uint STEP = 0u;
+const uint STEP_TILES = 0u;
+const uint STEP_FURTHER = 1u;
+const uint STEP_WALK = 2u;
 
 layout(set = 0, binding = 0, std140) uniform ViewBlock {
     ViewParams view;
@@ -27,18 +34,14 @@ layout(set = 0, binding = 9, std140) uniform Arguments {
 };
 layout(set = 0, binding = 10) uniform usampler2D list;
 layout(set = 0, binding = 11) uniform sampler2D shafts;
-layout(set = 0, binding = 12) uniform usampler2D pool;
+layout(set = 0, binding = 12) uniform usampler2D edge_pool;
 layout(set = 0, binding = 13) uniform usampler2D lists;
 layout(set = 0, binding = 14, r32f) uniform writeonly image2D visibility;
 layout(set = 0, binding = 15) uniform usampler2D tasks;
 layout(set = 0, binding = 16, r32ui) uniform uimage2D words;
-
-const uint STEP_TILES = 0u;
-const uint STEP_FURTHER = 1u;
-const uint STEP_WALK = 2u;
+layout(set = 0, binding = 17) uniform usampler2D triangle_pool;
 
 layout(push_constant) uniform Push {
-    uint step;      // one of the above
     uint first_run; // of nodes, of this dispatch
     uint run;       // nodes of a run
 } push;
@@ -72,39 +75,35 @@ vec4 fetch_texture_texel(ivec2 place) {
     return texelFetch(texels, place, 0);
 }
 
-MaskReceiver fetch_receiver(uvec2 pixel, out uint blocked[ROWS]) {
+// A receiver, and what its own plane hides.
+MaskReceiver fetch_receiver(uvec2 pixel, out uvec2 blocked) {
     uvec2 within = min(pixel, params.counts.xy - 1u);
     float depth = texelFetch(view_depth, ivec2(within), 0).x;
     vec3 ray = pixel_ray(view.camera, within);
     MaskReceiver receiver;
     receiver.position = view.camera.eye.xyz + depth * ray;
     receiver.id = depth > 0.0 ? texelFetch(ids, ivec2(within), 0).x : 0u;
-    receiver.light = light_from(view.light, receiver.position);
-    vec3 extent = max(abs(receiver.position), LIGHT_SHAPE == LIGHT_SUN ? vec3(0.0) : abs(view.light.center.xyz));
-    receiver.rounding_m = POSITION_ROUNDING * max(extent.x, max(extent.y, extent.z));
     vec3 normal = fetch_geometric_normal(max(receiver.id, 1u) - 1u);
     normal = dot(normal, ray) > 0.0 ? -normal : normal;
-    start_mask(receiver, normal, blocked);
+    blocked = own_mask(light_from(view.light, receiver.position), normal);
     return receiver;
 }
 
-void store(uint tile, uvec2 pixel, MaskReceiver receiver, uint blocked[ROWS], bool in_parts) {
+void store(uint tile, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 blocked, bool in_parts) {
+    blocked = receiver.id == 0u ? uvec2(0u) : blocked;
     if (!in_parts) {
         // Stores beyond the picture's border are dropped.
-        float seen = receiver.id == 0u ? 1.0 : mask_visibility(blocked);
-        imageStore(visibility, ivec2(pixel), vec4(seen));
+        int hidden = bitCount(blocked.x) + bitCount(blocked.y);
+        float samples = float(ROWS * COLUMNS);
+        imageStore(visibility, ivec2(pixel), vec4((samples - float(hidden)) / samples));
         return;
     }
-    for (uint word = 0u; word < WORDS; ++word) {
-        uint bits = 0u;
-        for (uint i = 0u; i < ROWS_IN_WORD; ++i) {
-            bits |= (blocked[word * ROWS_IN_WORD + i] & ALL_COLUMNS) << (i * COLUMNS);
-        }
-        ivec2 place = word_place(tile, pixel % TILE_SIZE, word);
-        if (push.step != STEP_TILES) {
-            imageAtomicOr(words, place, receiver.id == 0u ? 0u : bits);
+    for (uint word = 0u; word < 2u; ++word) {
+        ivec2 place = word_place(tile, pixel % TILE_SIZE, params.pattern.y, 2u * block + word);
+        if (STEP != STEP_TILES) {
+            imageAtomicOr(words, place, blocked[word]);
         } else {
-            imageStore(words, place, uvec4(receiver.id == 0u ? 0u : bits));
+            imageStore(words, place, uvec4(blocked[word]));
         }
     }
 }
@@ -115,74 +114,114 @@ void main() {
         return;
     }
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
-    uvec4 task = push.step == STEP_FURTHER ? texelFetch(tasks, task_place(index), 0)
+    uvec4 task = STEP == STEP_FURTHER ? texelFetch(tasks, task_place(index), 0)
         : texelFetch(list, tile_entry_place(index, tiles), 0);
     uvec2 tile = tile_of_entry(task.x, tiles);
-    uvec4 stored = texelFetch(lists, ivec2(tile), 0);
+    ivec2 at = list_place(tile);
+    uvec4 stored = texelFetch(lists, at, 0);
     if (stored.w == TILE_SETTLED) {
         return;
     }
+    Entries entries = entries_of(texelFetch(lists, at + ivec2(1, 0), 0), texelFetch(lists, at + ivec2(2, 0), 0));
+    uint block = gl_WorkGroupID.z % params.pattern.y;
+    fetch_light_rows(block);
+
     uvec2 pixel = tile * TILE_SIZE + gl_LocalInvocationID.xy;
     uvec2 step = uvec2(0u, 2u);
-    uint blocked_0[ROWS];
-    uint blocked_1[ROWS];
-    uint blocked_2[ROWS];
-    uint blocked_3[ROWS];
+    uvec2 blocked_0;
+    uvec2 blocked_1;
+    uvec2 blocked_2;
+    uvec2 blocked_3;
     MaskReceiver receiver_0 = fetch_receiver(pixel, blocked_0);
     MaskReceiver receiver_1 = fetch_receiver(pixel + step, blocked_1);
     MaskReceiver receiver_2 = fetch_receiver(pixel + 2u * step, blocked_2);
     MaskReceiver receiver_3 = fetch_receiver(pixel + 3u * step, blocked_3);
+    bool in_parts = params.pattern.y > 1u || entries.whole + entries.others > TASK_ENTRIES
+        || stored.z < params.counts.z;
 
-    bool in_parts = stored.y > TASK_ENTRIES || stored.z < params.counts.z;
-    TriangleList found = TriangleList(stored.x, min(stored.y, TASK_ENTRIES), 0u);
-    uint node = 0u;
-    uint end = 0u;
-    Shaft shaft;
-    if (push.step == STEP_FURTHER) {
-        found = TriangleList(task.y, min(stored.y - task.z, TASK_ENTRIES), 0u);
-    } else if (push.step == STEP_WALK) {
+    if (STEP != STEP_WALK) {
+        Projection from_0 = projection_from(receiver_0);
+        Projection from_1 = projection_from(receiver_1);
+        Projection from_2 = projection_from(receiver_2);
+        Projection from_3 = projection_from(receiver_3);
+        if (STEP == STEP_TILES) {
+            uint counts_0[2u * ROWS];
+            uint counts_1[2u * ROWS];
+            uint counts_2[2u * ROWS];
+            uint counts_3[2u * ROWS];
+            for (uint i = 0u; i < 2u * ROWS; ++i) {
+                counts_0[i] = NO_COUNT;
+                counts_1[i] = NO_COUNT;
+                counts_2[i] = NO_COUNT;
+                counts_3[i] = NO_COUNT;
+            }
+            for (uint i = 0u; i < entries.edges; ++i) {
+                uint code = texelFetch(edge_pool, triangle_texel_place(entries.first_edge + i), 0).x;
+                uint triangle = (code & ~(EDGE_DOUBLE | EDGE_TURNED)) >> EDGE_CORNER_BITS;
+                uint corner = code & ((1u << EDGE_CORNER_BITS) - 1u);
+                vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
+                vec3 b = fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
+                count_edge(from_0, a, b, code, counts_0);
+                count_edge(from_1, a, b, code, counts_1);
+                count_edge(from_2, a, b, code, counts_2);
+                count_edge(from_3, a, b, code, counts_3);
+            }
+            blocked_0 |= counted_mask(counts_0);
+            blocked_1 |= counted_mask(counts_1);
+            blocked_2 |= counted_mask(counts_2);
+            blocked_3 |= counted_mask(counts_3);
+        }
+        uint first = STEP == STEP_FURTHER ? task.y : 0u;
+        uint end = min(first + TASK_ENTRIES, entries.whole);
+        for (uint i = first; i < end; ++i) {
+            uint triangle = texelFetch(triangle_pool, triangle_texel_place(entries.first + i), 0).x;
+            vec3 a = fetch_triangle_texel(4u * triangle).xyz;
+            vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
+            vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
+            add_whole(from_0, a, b, c, blocked_0);
+            add_whole(from_1, a, b, c, blocked_1);
+            add_whole(from_2, a, b, c, blocked_2);
+            add_whole(from_3, a, b, c, blocked_3);
+        }
+        end = min(first + TASK_ENTRIES, entries.whole + entries.others);
+        LightFrom light_0 = light_from(view.light, receiver_0.position);
+        LightFrom light_1 = light_from(view.light, receiver_1.position);
+        LightFrom light_2 = light_from(view.light, receiver_2.position);
+        LightFrom light_3 = light_from(view.light, receiver_3.position);
+        for (uint i = max(first, entries.whole); i < end; ++i) {
+            uint place = entries.first + entries.room - 1u - (i - entries.whole);
+            Blocker blocker = fetch_blocker(texelFetch(triangle_pool, triangle_texel_place(place), 0).x);
+            add_blocker(receiver_0, light_0, block, blocker, blocked_0);
+            add_blocker(receiver_1, light_1, block, blocker, blocked_1);
+            add_blocker(receiver_2, light_2, block, blocker, blocked_2);
+            add_blocker(receiver_3, light_3, block, blocker, blocked_3);
+        }
+    } else {
+        LightFrom light_0 = light_from(view.light, receiver_0.position);
+        LightFrom light_1 = light_from(view.light, receiver_1.position);
+        LightFrom light_2 = light_from(view.light, receiver_2.position);
+        LightFrom light_3 = light_from(view.light, receiver_3.position);
         // A walk can begin at any node: what is known of those above is only that they may be met.
-        found.count = 0u;
-        uint first = (push.first_run + gl_WorkGroupID.z) * push.run;
-        node = max(first, stored.z);
-        end = min(first + push.run, params.counts.z);
-        shaft = fetch_shaft(tile);
-    }
-    uint slot = 0u;
-    while (found.count > 0u || node < end) {
-        bool listed = found.count > 0u;
-        uint triangle = 0u;
-        bool meets = listed;
-        if (listed) {
-            if (slot == CHUNK) {
-                found.chunk = texelFetch(pool, chunk_entry_place(found.chunk, CHUNK), 0).x;
-                slot = 0u;
-            }
-            triangle = texelFetch(pool, chunk_entry_place(found.chunk, slot), 0).x;
-            slot += 1u;
-            found.count -= 1u;
-        } else {
+        uint first = (push.first_run + gl_WorkGroupID.z / params.pattern.y) * push.run;
+        uint node = max(first, stored.z);
+        uint end = min(first + push.run, params.counts.z);
+        Shaft shaft = fetch_shaft(tile);
+        while (node < end) {
             vec4 low = fetch_node_low(node);
-            if (low.w >= 0.0) {
-                triangle = uint(low.w);
-                meets = true;
-                node += 1u;
-            } else {
-                node = shaft_meets_box(shaft, low.xyz, fetch_node_high(node)) ? node + 1u : uint(-low.w);
-            }
-        }
-        if (meets) {
-            Blocker blocker = fetch_blocker(triangle);
-            if (listed || shaft_meets_triangle(shaft, blocker.a, blocker.b, blocker.c)) {
-                add_blocker(receiver_0, blocker, blocked_0);
-                add_blocker(receiver_1, blocker, blocked_1);
-                add_blocker(receiver_2, blocker, blocked_2);
-                add_blocker(receiver_3, blocker, blocked_3);
+            bool leaf = low.w >= 0.0;
+            bool meets = shaft_meets_box(shaft, low.xyz, fetch_node_high(node).xyz);
+            node = leaf || meets ? node + 1u : uint(-low.w);
+            if (leaf && meets) {
+                Blocker blocker = fetch_blocker(uint(low.w));
+                add_blocker(receiver_0, light_0, block, blocker, blocked_0);
+                add_blocker(receiver_1, light_1, block, blocker, blocked_1);
+                add_blocker(receiver_2, light_2, block, blocker, blocked_2);
+                add_blocker(receiver_3, light_3, block, blocker, blocked_3);
             }
         }
     }
-    store(task.x, pixel, receiver_0, blocked_0, in_parts);
-    store(task.x, pixel + step, receiver_1, blocked_1, in_parts);
-    store(task.x, pixel + 2u * step, receiver_2, blocked_2, in_parts);
-    store(task.x, pixel + 3u * step, receiver_3, blocked_3, in_parts);
+    store(task.x, block, pixel, receiver_0, blocked_0, in_parts);
+    store(task.x, block, pixel + step, receiver_1, blocked_1, in_parts);
+    store(task.x, block, pixel + 2u * step, receiver_2, blocked_2, in_parts);
+    store(task.x, block, pixel + 3u * step, receiver_3, blocked_3, in_parts);
 }

@@ -1,9 +1,9 @@
 // Which samples of the light a receiver sees: bits in rows, set where a triangle blocks.
 //
-// Samples lie on a plane (of a sun: its directions on the plane at distance 1), in rows. What an edge
-// hides, as seen from the receiver, ends at a line on that plane, which parts each row at one column:
-// a triangle is the AND of three such half-planes, and of a fourth where its own plane passes between
-// samples, behind which it does not block. Blockers are ORed: what overlaps counts once. Related:
+// Samples lie on a plane (of a sun: its directions on the plane at distance 1), in rows. Triangles wholly
+// between receiver and plane are projected onto it: an edge then parts each row that it crosses at one
+// column. Others are the AND of three half-planes, and of a fourth where their own plane passes between
+// samples, behind which they do not block. Blockers are ORed: what overlaps counts once. Related:
 // Eisemann and Decoret 2007, "Visibility Sampling on GPU and Applications"; Schwarz and Stamminger 2007,
 // "Bitmask Soft Shadows".
 #ifndef ANTUMBRA_SHAFT_MASKS_MASKS_GLSL
@@ -46,9 +46,147 @@ LightFrom light_from(Light light, vec3 p) {
 struct MaskReceiver {
     vec3 position; // scene space, metres
     uint id;       // of its triangle, plus one; 0 for none
-    float rounding_m;
-    LightFrom light;
 };
+
+// The rows of a block of samples: params.rows, columns from the block's first one on.
+vec4 light_rows[ROWS];
+
+void fetch_light_rows(uint block) {
+    uint across = params.pattern.x;
+    for (uint r = 0u; r < ROWS; ++r) {
+        light_rows[r] = params.rows[block / across * ROWS + r];
+        light_rows[r].z -= float(block % across * COLUMNS);
+    }
+}
+
+// Adding 1.5 * 2^23 leaves a float's integer part in its lowest bits.
+const float TO_INTEGER = 12582912.0;
+
+// Number of a row's samples that lie before the place, 0 to 8.
+uint columns_before(vec4 row, float place) {
+    float column = row.y * place + row.z;
+    if (LIGHT_SHAPE == LIGHT_SUN) {
+        column = row.y * (place * inversesqrt(row.w + place * place * SUN_TANGENT_SQUARE)) + row.z;
+    }
+    precise float shifted = clamp(column, 0.0, float(COLUMNS)) + TO_INTEGER;
+    return floatBitsToUint(shifted) & 15u;
+}
+
+// What projects points onto the plane of the samples, as coordinates on the light.
+struct Projection {
+    vec3 from;
+    vec3 x;
+    vec3 y;
+    vec3 z; // the plane is at 1, the receiver at 0
+    vec2 middle;
+    bool turned; // for the receiver y is clockwise of x
+};
+
+Projection projection_from(MaskReceiver receiver) {
+    LightFrom light = light_from(view.light, receiver.position);
+    vec3 across = cross(light.x, light.y);
+    float height = dot(across, light.center);
+    Projection projection;
+    projection.from = receiver.position;
+    projection.x = light.x / max(dot(light.x, light.x), 1.0e-37);
+    projection.y = light.y / max(dot(light.y, light.y), 1.0e-37);
+    projection.z = across / (abs(height) < 1.0e-37 ? 1.0e-37 : height);
+    projection.middle = vec2(dot(projection.x, light.center), dot(projection.y, light.center));
+    projection.turned = height > 0.0;
+    return projection;
+}
+
+vec2 project(Projection projection, vec3 p) {
+    precise vec3 offset = p - projection.from;
+    precise vec2 place = vec2(dot(offset, projection.x), dot(offset, projection.y));
+    precise float inverse = 1.0 / dot(offset, projection.z);
+    precise vec2 result = place * inverse - projection.middle;
+    return result;
+}
+
+// A projected edge from its lower to its upper end, so that it is the same line for both its triangles.
+struct Side {
+    vec2 low;
+    float high;
+    float slope;
+};
+
+Side side_between(vec2 a, vec2 b) {
+    precise float slope = (b.x - a.x) / (b.y - a.y);
+    return Side(a.y < b.y ? a : b, max(a.y, b.y), slope);
+}
+
+// Number of a row's samples before the edge; of no meaning in rows that it does not cross.
+uint columns_before_side(vec4 row, Side side) {
+    precise float place = (row.x - side.low.y) * side.slope + side.low.x;
+    return columns_before(row, place);
+}
+
+bool crosses(vec4 row, Side side) {
+    return side.low.y <= row.x && row.x < side.high;
+}
+
+// Numbers of triangles before samples: of each row two words of four bytes.
+const uint NO_COUNT = 0x08080808u; // below nothing there is some room for rounding
+const uint ONE_EACH = 0x01010101u;
+
+// Counts on from an edge: a triangle begins or ends there.
+void count_edge(Projection projection, vec3 from, vec3 to, uint code, inout uint counts[2u * ROWS]) {
+    vec2 a = project(projection, from);
+    vec2 b = project(projection, to);
+    Side side = side_between(a, b);
+    // Corners of a triangle that is seen from its front go round counter-clockwise, and its inside is on
+    // the left of edges that go up.
+    bool ends = (a.y < b.y) == (((code & EDGE_TURNED) != 0u) == projection.turned);
+    uint step = (code & EDGE_DOUBLE) != 0u ? 2u * ONE_EACH : ONE_EACH;
+    step = ends ? 0u - step : step;
+    for (uint r = 0u; r < ROWS; ++r) {
+        uint bits = 8u * columns_before_side(light_rows[r], side);
+        uint crossed = crosses(light_rows[r], side) ? step : 0u;
+        counts[2u * r] += bits < 32u ? crossed << bits : 0u;
+        counts[2u * r + 1u] += bits < 32u ? crossed : bits < 64u ? crossed << (bits & 31u) : 0u;
+    }
+}
+
+// A bit for each byte that is not NO_COUNT's.
+uint counted_bits(uint counts) {
+    uint off = counts ^ NO_COUNT;
+    uint high = ((off & 0x7f7f7f7fu) + 0x7f7f7f7fu | off) & 0x80808080u;
+    return (high >> 7) * 0x01020408u >> 24 & 15u;
+}
+
+uvec2 counted_mask(uint counts[2u * ROWS]) {
+    uvec2 blocked = uvec2(0u);
+    for (uint r = 0u; r < ROWS; ++r) {
+        uint row = counted_bits(counts[2u * r]) | counted_bits(counts[2u * r + 1u]) << 4;
+        blocked[r / 4u] |= row << (8u * (r % 4u));
+    }
+    return blocked;
+}
+
+// Sets the bits of the samples that a triangle hides which is between the receiver and their plane.
+void add_whole(Projection projection, vec3 corner_a, vec3 corner_b, vec3 corner_c, inout uvec2 blocked) {
+    vec2 a = project(projection, corner_a);
+    vec2 b = project(projection, corner_b);
+    vec2 c = project(projection, corner_c);
+    // From the lowest to the highest.
+    vec2 low = a.y < b.y ? a : b;
+    vec2 high = a.y < b.y ? b : a;
+    vec2 first = low.y < c.y ? low : c;
+    vec2 rest = low.y < c.y ? c : low;
+    vec2 middle = rest.y < high.y ? rest : high;
+    vec2 last = rest.y < high.y ? high : rest;
+    Side whole = side_between(first, last);
+    Side lower = side_between(first, middle);
+    Side upper = side_between(middle, last);
+    for (uint r = 0u; r < ROWS; ++r) {
+        vec4 row = light_rows[r];
+        bool below = row.x < middle.y;
+        Side other = Side(below ? lower.low : upper.low, 0.0, below ? lower.slope : upper.slope);
+        uint within = 0xffu << columns_before_side(row, whole) ^ 0xffu << columns_before_side(row, other);
+        blocked[r / 4u] |= crosses(row, whole) ? (within & 0xffu) << (8u * (r % 4u)) : 0u;
+    }
+}
 
 // Line on the light: samples with x u + y v + z >= 0 are within.
 vec3 line_of_plane(LightFrom light, vec3 normal) {
@@ -64,36 +202,22 @@ float line_least(vec3 line) {
     return line.z - abs(line.x) - abs(line.y);
 }
 
-// Adding 1.5 * 2^23 leaves a float's integer part in its lowest bits.
-const float TO_INTEGER = 12582912.0;
-
-uint columns_from(float column) {
-    precise float shifted = clamp(column, 0.0, float(COLUMNS)) + TO_INTEGER;
-    uint first = floatBitsToUint(shifted) & 63u;
-    return COLUMNS == 32u && first == 32u ? 0u : 0xffffffffu << first;
-}
-
-// The column that the line parts a row at.
-float line_column(vec4 row, float slope, float at) {
-    precise float place = slope * row.x + at;
-    if (LIGHT_SHAPE == LIGHT_SUN) {
-        return row.y * (place * inversesqrt(row.w + place * place * SUN_TANGENT_SQUARE)) + row.z;
-    }
-    return row.y * place + row.z;
-}
-
-// ANDs what is within the line to the rows.
-void and_line(vec3 line, inout uint rows[ROWS]) {
+// The samples within the line.
+uvec2 mask_of_line(vec3 line) {
     // A line along the rows crosses them far out: there only its side counts.
     float least = 1.0e-8 * (abs(line.y) + abs(line.z)) + 1.0e-37;
     float across = abs(line.x) < least ? (line.x < 0.0 ? -least : least) : line.x;
     float inverse = -1.0 / across;
     float slope = line.y * inverse;
     float at = line.z * inverse;
-    uint flip = across < 0.0 ? 0xffffffffu : 0u;
+    uint flip = across < 0.0 ? 0xffu : 0u;
+    uvec2 within = uvec2(0u);
     for (uint r = 0u; r < ROWS; ++r) {
-        rows[r] &= columns_from(line_column(params.rows[r], slope, at)) ^ flip;
+        precise float place = slope * light_rows[r].x + at;
+        uint row = (0xffu << columns_before(light_rows[r], place) ^ flip) & 0xffu;
+        within[r / 4u] |= row << (8u * (r % 4u));
     }
+    return within;
 }
 
 precise vec3 exact_cross(vec3 a, vec3 b) {
@@ -118,86 +242,62 @@ Blocker fetch_blocker(uint triangle) {
 }
 
 // Takes out the samples that are seen through holes. ab, bc, ca: the lines of the triangle's edges.
-void cut_holes(Blocker blocker, vec3 ab, vec3 bc, vec3 ca, uint blocked[ROWS], inout uint rows[ROWS]) {
+void cut_holes(Blocker blocker, uint block, vec3 ab, vec3 bc, vec3 ca, uvec2 blocked, inout uvec2 within) {
     uint material = material_number(blocker.plane.w);
-    for (uint r = 0u; r < ROWS; ++r) {
-        vec4 row = params.rows[r];
-        // What others block already needs no look.
-        uint rest = rows[r] & ALL_COLUMNS & ~blocked[r];
-        while (rest != 0u) {
-            uint column = uint(findLSB(rest));
-            rest &= rest - 1u;
-            float place = (float(column) + 0.5 - row.z) / max(row.y, 1.0e-37);
-            if (LIGHT_SHAPE == LIGHT_SUN) {
-                float scaled = place * place * SUN_TANGENT_SQUARE;
-                place *= sqrt(row.w / max(1.0 - scaled, 1.0e-6));
-            }
-            vec3 at = vec3(place, row.x, 1.0);
-            vec3 weights = vec3(dot(bc, at), dot(ca, at), dot(ab, at));
-            float sum = weights.x + weights.y + weights.z;
-            weights = sum != 0.0 ? weights / sum : vec3(1.0, 0.0, 0.0);
-            if (is_hole(material, fetch_uv(blocker.triangle, weights))) {
-                rows[r] &= ~(1u << column);
-            }
+    // What others block already needs no look.
+    uvec2 rest = within & ~blocked;
+    while ((rest.x | rest.y) != 0u) {
+        uint word = rest.x != 0u ? 0u : 1u;
+        uint bit = uint(findLSB(rest[word]));
+        rest[word] &= rest[word] - 1u;
+        uint across = params.pattern.x;
+        vec4 row = params.rows[block / across * ROWS + 4u * word + bit / 8u];
+        float column = float(block % across * COLUMNS + bit % 8u);
+        float place = (column + 0.5 - row.z) / max(row.y, 1.0e-37);
+        if (LIGHT_SHAPE == LIGHT_SUN) {
+            float scaled = place * place * SUN_TANGENT_SQUARE;
+            place *= sqrt(row.w / max(1.0 - scaled, 1.0e-6));
+        }
+        vec3 at = vec3(place, row.x, 1.0);
+        vec3 weights = vec3(dot(bc, at), dot(ca, at), dot(ab, at));
+        float sum = weights.x + weights.y + weights.z;
+        weights = sum != 0.0 ? weights / sum : vec3(1.0, 0.0, 0.0);
+        if (is_hole(material, fetch_uv(blocker.triangle, weights))) {
+            within[word] &= ~(1u << bit);
         }
     }
 }
 
-// Sets the bits of the samples that the triangle hides from the receiver.
-void add_blocker(MaskReceiver receiver, Blocker blocker, inout uint blocked[ROWS]) {
+// Sets the bits of the samples that the triangle hides from the receiver, wherever it is.
+void add_blocker(MaskReceiver receiver, LightFrom light, uint block, Blocker blocker, inout uvec2 blocked) {
     vec3 a = blocker.a - receiver.position;
     vec3 b = blocker.b - receiver.position;
     vec3 c = blocker.c - receiver.position;
+    vec3 extent = max(abs(receiver.position), LIGHT_SHAPE == LIGHT_SUN ? vec3(0.0) : abs(view.light.center.xyz));
+    float rounding_m = POSITION_ROUNDING * max(extent.x, max(extent.y, extent.z));
     float height = dot(blocker.plane.xyz, a);
     float turn = height > 0.0 ? 1.0 : -1.0;
-    vec3 ab = line_of_plane(receiver.light, turn * exact_cross(a, b));
-    vec3 bc = line_of_plane(receiver.light, turn * exact_cross(b, c));
-    vec3 ca = line_of_plane(receiver.light, turn * exact_cross(c, a));
-    vec3 beyond = line_of_plane(receiver.light, turn * blocker.plane.xyz);
+    vec3 ab = line_of_plane(light, turn * exact_cross(a, b));
+    vec3 bc = line_of_plane(light, turn * exact_cross(b, c));
+    vec3 ca = line_of_plane(light, turn * exact_cross(c, a));
+    vec3 beyond = line_of_plane(light, turn * blocker.plane.xyz);
     beyond.z -= LIGHT_SHAPE == LIGHT_SUN ? 0.0 : abs(height);
     float most = min(min(line_most(ab), line_most(bc)), min(line_most(ca), line_most(beyond)));
-    bool meets = most >= 0.0 && abs(height) > receiver.rounding_m
-        && receiver.id != blocker.triangle + 1u;
-    if (meets) {
-        uint rows[ROWS];
-        for (uint r = 0u; r < ROWS; ++r) {
-            rows[r] = 0xffffffffu;
-        }
-        and_line(ab, rows);
-        and_line(bc, rows);
-        and_line(ca, rows);
-        if (line_least(beyond) < 0.0) {
-            and_line(beyond, rows);
-        }
-        if (MASKED != 0u && material_is_masked(blocker.plane.w)) {
-            cut_holes(blocker, ab, bc, ca, blocked, rows);
-        }
-        for (uint r = 0u; r < ROWS; ++r) {
-            blocked[r] |= rows[r];
-        }
+    bool meets = most >= 0.0 && abs(height) > rounding_m && receiver.id != blocker.triangle + 1u;
+    uvec2 within = mask_of_line(ab) & mask_of_line(bc) & mask_of_line(ca);
+    within &= line_least(beyond) < 0.0 ? mask_of_line(beyond) : uvec2(0xffffffffu);
+    within = meets ? within : uvec2(0u);
+    if (MASKED != 0u && material_is_masked(blocker.plane.w)) {
+        cut_holes(blocker, block, ab, bc, ca, blocked, within);
     }
+    blocked |= within;
 }
 
-// What the receiver's own plane leaves of the light.
-void start_mask(MaskReceiver receiver, vec3 normal, out uint blocked[ROWS]) {
-    for (uint r = 0u; r < ROWS; ++r) {
-        blocked[r] = 0xffffffffu;
-    }
-    vec3 above = line_of_plane(receiver.light, normal);
-    if (line_most(above) > 0.0) {
-        and_line(above, blocked);
-        for (uint r = 0u; r < ROWS; ++r) {
-            blocked[r] = line_least(above) > 0.0 ? 0u : ~blocked[r];
-        }
-    }
-}
-
-float mask_visibility(uint blocked[ROWS]) {
-    int seen = 0;
-    for (uint r = 0u; r < ROWS; ++r) {
-        seen += bitCount(~blocked[r] & ALL_COLUMNS);
-    }
-    return float(seen) / float(ROWS * COLUMNS);
+// What the receiver's own plane hides of the light.
+uvec2 own_mask(LightFrom light, vec3 normal) {
+    vec3 above = line_of_plane(light, normal);
+    return line_most(above) <= 0.0 ? uvec2(0xffffffffu)
+        : line_least(above) > 0.0 ? uvec2(0u) : ~mask_of_line(above);
 }
 
 #endif

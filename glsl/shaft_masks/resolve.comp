@@ -1,5 +1,5 @@
 #version 460
-// Visibility of the tiles that were worked on in several tasks.
+// Visibility of the tiles that were worked on in several tasks or blocks of samples.
 
 #include "common/tiles.glsl"
 #include "shaft_masks/lists.glsl"
@@ -14,15 +14,10 @@ layout(set = 0, binding = 0, std140) uniform ShaftBlock {
 layout(set = 0, binding = 1, std140) uniform Arguments {
     TileArguments arguments;
 };
-layout(set = 0, binding = 2) uniform usampler2D tasks;
+layout(set = 0, binding = 2) uniform usampler2D list;
 layout(set = 0, binding = 3) uniform usampler2D lists;
 layout(set = 0, binding = 4) uniform usampler2D words;
 layout(set = 0, binding = 5, r32f) uniform writeonly image2D visibility;
-layout(set = 0, binding = 6) uniform usampler2D partial_list;
-
-layout(push_constant) uniform Push {
-    uint is_partial; // 1 for the tiles whose lists do not know all
-} push;
 
 vec4 fetch_triangle_texel(uint texel) {
     return vec4(0.0); // none is needed here
@@ -34,20 +29,21 @@ void main() {
         return;
     }
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
-    uvec4 task = push.is_partial != 0u ? texelFetch(partial_list, tile_entry_place(index, tiles), 0)
-        : texelFetch(tasks, task_place(index), 0);
-    uvec2 tile = tile_of_entry(task.x, tiles);
-    // One task of the tile is enough.
-    bool is_first = push.is_partial != 0u || task.z == TASK_ENTRIES;
-    if (!is_first || texelFetch(lists, ivec2(tile), 0).w == TILE_SETTLED) {
+    uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
+    uvec2 tile = tile_of_entry(entry, tiles);
+    uvec4 stored = texelFetch(lists, list_place(tile), 0);
+    uvec4 counts = texelFetch(lists, list_place(tile) + ivec2(2, 0), 0);
+    uint blocks = params.pattern.y;
+    bool in_parts = blocks > 1u || counts.x + counts.y > TASK_ENTRIES || stored.z < params.counts.z;
+    if (!in_parts || stored.w == TILE_SETTLED) {
         return;
     }
     int hidden = 0;
-    for (uint word = 0u; word < WORDS; ++word) {
-        ivec2 place = word_place(task.x, gl_LocalInvocationID.xy, word);
+    for (uint word = 0u; word < 2u * blocks; ++word) {
+        ivec2 place = word_place(entry, gl_LocalInvocationID.xy, blocks, word);
         hidden += bitCount(texelFetch(words, place, 0).x);
     }
     uvec2 pixel = tile * TILE_SIZE + gl_LocalInvocationID.xy;
-    float samples = float(ROWS * COLUMNS);
+    float samples = float(ROWS * COLUMNS * blocks);
     imageStore(visibility, ivec2(pixel), vec4((samples - float(hidden)) / samples));
 }

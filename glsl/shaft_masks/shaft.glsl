@@ -11,8 +11,8 @@
 
 // Four sides, two ends, and the surfaces' own plane where they have one.
 const uint SHAFT_PLANES = 7u;
-// Texels of a tile's shaft, side by side: planes, box.
-const uint SHAFT_TEXELS = SHAFT_PLANES + 2u;
+// Texels of a tile's shaft, side by side: planes, box, box of its surfaces, space between.
+const uint SHAFT_TEXELS = SHAFT_PLANES + 8u;
 
 // Rounding of positions, as a part of the largest coordinate: a few units of the last place. What is
 // nearer to a surface than that does not block its light.
@@ -37,15 +37,34 @@ Shaft fetch_shaft(uvec2 tile) {
     return shaft;
 }
 
-bool shaft_meets_box(Shaft shaft, vec3 low, vec3 high) {
+// Where a box lies to a shaft.
+const uint BOX_OUTSIDE = 0u;
+const uint BOX_MEETS = 1u;
+const uint BOX_INSIDE = 2u;
+
+// Rounding of the sums below, as a part of their terms: every triangle of a box that is outside is
+// outside by shaft_meets_triangle, and every one of a box that is inside meets the shaft by it.
+const float BOX_ROUNDING = 1.0e-6;
+
+uint shaft_side_of_box(Shaft shaft, vec3 low, vec3 high) {
     vec3 middle = 0.5 * low + 0.5 * high;
     vec3 half_size = 0.5 * high - 0.5 * low;
     bool meets = all(lessThanEqual(low, shaft.high.xyz)) && all(greaterThanEqual(high, shaft.low.xyz));
+    bool inside = all(greaterThanEqual(low, shaft.low.xyz)) && all(lessThanEqual(high, shaft.high.xyz));
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         vec4 plane = shaft.planes[i];
-        meets = meets && dot(plane.xyz, middle) - dot(abs(plane.xyz), half_size) <= plane.w;
+        vec3 size = abs(plane.xyz);
+        float height = dot(plane.xyz, middle) - plane.w;
+        float extent = dot(size, half_size);
+        float slack = BOX_ROUNDING * (dot(size, abs(middle)) + extent + abs(plane.w));
+        meets = meets && height - extent <= slack;
+        inside = inside && height + extent <= -slack;
     }
-    return meets;
+    return !meets ? BOX_OUTSIDE : inside ? BOX_INSIDE : BOX_MEETS;
+}
+
+bool shaft_meets_box(Shaft shaft, vec3 low, vec3 high) {
+    return shaft_side_of_box(shaft, low, high) != BOX_OUTSIDE;
 }
 
 bool shaft_meets_triangle(Shaft shaft, vec3 a, vec3 b, vec3 c) {

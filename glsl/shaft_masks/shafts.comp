@@ -63,6 +63,53 @@ vec3 hull_side(vec2 light_half, float reach_a, float near_z, float far_z) {
     return vec3(normal, max(light, surfaces));
 }
 
+// Axes of a box that fits flat surfaces: along the normal of the surface at a pixel, and along the view.
+mat3 surface_frame(uvec2 pixel, vec3 ray) {
+    uint id = texelFetch(ids, ivec2(pixel), 0).x;
+    vec3 z = fetch_geometric_normal(max(id, 1u) - 1u);
+    vec3 along = cross(z, ray);
+    float square = dot(along, along);
+    vec3 other = abs(z.x) < 0.7 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
+    vec3 x = square > 0.0 ? along * inversesqrt(square) : normalize(cross(z, other));
+    return mat3(x, cross(z, x), z);
+}
+
+// Surfaces of shaft_masks/sides.glsl. low, high: of the box in its frame, from some surface.
+void store_surfaces(ivec2 place, Light light, vec3 some, mat3 frame, vec3 low, vec3 high, float slack) {
+    vec3 center = some + frame * (0.5 * low + 0.5 * high);
+    vec3 half_size = 0.5 * high - 0.5 * low;
+    float radius = length(half_size);
+    vec3 z = LIGHT_SHAPE == LIGHT_SUN ? light.center.xyz : light.direction.xyz;
+    float tilt = 0.0;
+    float least = LIGHT_SHAPE == LIGHT_SUN ? dot(abs(z * frame), half_size) + slack : slack;
+    float most = FAR;
+    if (LIGHT_SHAPE == LIGHT_SPHERE) {
+        vec3 from = center - light.center.xyz;
+        float away = length(from);
+        float nearest = away - radius;
+        bool outside = nearest > light.axis_x.w;
+        z = outside ? from / away : z;
+        // The samples' disk is across the line to the surface, radius^2 / distance from the centre.
+        tilt = outside ? 2.0 * radius / away : 0.0;
+        least = outside ? light.axis_x.w * light.axis_x.w / nearest + slack : FAR;
+    }
+    if (LIGHT_SHAPE == LIGHT_POINT || LIGHT_SHAPE == LIGHT_LINE) {
+        least = FAR; // their samples span no plane
+    } else if (LIGHT_SHAPE != LIGHT_SUN) {
+        most = dot(center - light.center.xyz, z) - dot(abs(z * frame), half_size) - slack;
+    }
+    // Of no size: the samples span no plane either.
+    if (min(light.axis_x.w, light.axis_y.w) < 1.0e-30) {
+        least = FAR;
+    }
+    imageStore(shafts, place, vec4(center, slack));
+    imageStore(shafts, place + ivec2(1, 0), vec4(frame[0] * half_size.x, 0.0));
+    imageStore(shafts, place + ivec2(2, 0), vec4(frame[1] * half_size.y, 0.0));
+    imageStore(shafts, place + ivec2(3, 0), vec4(frame[2] * half_size.z, 0.0));
+    imageStore(shafts, place + ivec2(4, 0), vec4(z, tilt));
+    imageStore(shafts, place + ivec2(5, 0), vec4(least, most, radius, 0.0));
+}
+
 void main() {
     uint index = gl_GlobalInvocationID.x;
     if (index >= arguments.count) {
@@ -74,19 +121,18 @@ void main() {
     Light light = view.light;
     vec3 eye = view.camera.eye.xyz;
 
-    // A surface of the tile, for the frame.
-    vec3 some = eye;
-    mat3 frame = light_frame(light, eye);
-    if (LIGHT_SHAPE == LIGHT_SPHERE) {
-        float deepest = 0.0;
-        for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
-            uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
-            float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
-            some = depth > deepest ? eye + depth * pixel_ray(view.camera, pixel) : some;
-            deepest = max(deepest, depth);
-        }
-        frame = light_frame(light, some);
+    // A surface of the tile, for the frames.
+    float deepest = 0.0;
+    uvec2 at = tile * TILE_SIZE;
+    for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
+        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
+        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        at = depth > deepest ? pixel : at;
+        deepest = max(deepest, depth);
     }
+    vec3 some = eye + deepest * pixel_ray(view.camera, at);
+    mat3 frame = light_frame(light, some);
+    mat3 box_frame = surface_frame(at, pixel_ray(view.camera, at));
 
     // Coordinates of a sun's frame are taken from the eye, of other lights from their centre.
     vec3 origin = LIGHT_SHAPE == LIGHT_SUN ? eye : light.center.xyz;
@@ -95,6 +141,8 @@ void main() {
         + abs(frame[2]) * half_size.z;
     vec3 low = vec3(FAR);
     vec3 high = vec3(-FAR);
+    vec3 own_low = vec3(FAR);
+    vec3 own_high = vec3(-FAR);
     vec3 box_low = vec3(FAR);
     vec3 box_high = vec3(-FAR);
     vec3 normal_low = vec3(2.0);
@@ -125,6 +173,9 @@ void main() {
             vec3 q = (p - origin) * frame;
             low = min(low, q);
             high = max(high, q);
+            vec3 own = (p - some) * box_frame;
+            own_low = min(own_low, own);
+            own_high = max(own_high, own);
             vec3 to_light = light_offset(light, p);
             above = above && dot(n, to_light) > dot(abs(n), light_reach) + SLACK * length(to_light);
         }
@@ -171,6 +222,8 @@ void main() {
         box_high = max(box_high, light.center.xyz + light_reach);
     }
     ivec2 place = ivec2(tile.x * SHAFT_TEXELS, tile.y);
+    store_surfaces(place + ivec2(SHAFT_PLANES + 2u, 0), light, some, box_frame, own_low - slack,
+        own_high + slack, slack);
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         imageStore(shafts, place + ivec2(i, 0), planes[i]);
     }

@@ -12,6 +12,7 @@ mod camera;
 mod draw;
 mod gbuffer;
 mod hierarchy;
+mod neighbours;
 mod scene_buffers;
 mod scene_layout;
 mod tight_box;

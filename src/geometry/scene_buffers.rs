@@ -2,6 +2,7 @@
 
 use super::adjacency::Adjacency;
 use super::hierarchy;
+use super::neighbours::neighbours;
 use super::scene_layout::{IMAGE_WIDTH, Layout, Vertex};
 use crate::gpu::{
     Buffer, Gpu, GpuError, Image, ImageSpec, MemoryLocation, OptionalFeatures, Retired,
@@ -86,8 +87,9 @@ pub struct SceneBuffers {
 
 /// Number of buffers: vertices, texture coordinates of masked ones, indices.
 const BUFFERS: usize = 3;
-/// Number of images: triangles, texture coordinates, materials, texels, hierarchy, edges, their ends.
-const IMAGES: usize = 7;
+/// Number of images: triangles, texture coordinates, materials, texels, hierarchy, edges, their ends,
+/// neighbours.
+const IMAGES: usize = 8;
 
 #[derive(Debug)]
 struct DeviceBuffers {
@@ -124,6 +126,8 @@ pub struct SceneIds {
     pub edges: ImageId,
     /// RGBA32F: ends of edges.
     pub points: ImageId,
+    /// RGBA32_UINT: of each triangle the ones across its edges, `shaft_masks/entries.comp`.
+    pub neighbours: ImageId,
 }
 
 impl SceneIds {
@@ -142,7 +146,9 @@ impl SceneBuffers {
         scene: &Scene,
     ) -> Result<Self, UploadError> {
         let most_rows = gpu.info().limits.max_image_dimension2_d as usize;
-        let most = (most_rows * IMAGE_WIDTH / 4).min(hierarchy::MOST_TRIANGLES);
+        // The hierarchy has two nodes a triangle, which are more than its four texels.
+        let most = most_rows * IMAGE_WIDTH / (2 * hierarchy::NODE_TEXELS);
+        let most = most.min(hierarchy::MOST_TRIANGLES);
         let triangles = scene.triangle_count();
         if triangles > most {
             return Err(UploadError::TooManyTriangles { triangles, most });
@@ -204,6 +210,7 @@ impl SceneBuffers {
                     image(floats, hierarchy::NODE_TEXELS * nodes),
                     image(vk::Format::R32G32B32A32_UINT, adjacency.edges.len()),
                     image(floats, adjacency.points.len()),
+                    image(vk::Format::R32G32B32A32_UINT, layout.triangles.len() / 4),
                 ],
             },
             draws: layout.draws.clone(),
@@ -272,7 +279,8 @@ impl SceneBuffers {
             made.buffers.push(buffer);
             uploaded?;
         }
-        let nodes = hierarchy::nodes(&layout.triangles);
+        let neighbours = neighbours(&layout.triangles);
+        let nodes = hierarchy::nodes(&layout.triangles, &neighbours);
         let images: [(&str, &[u8]); IMAGES] = [
             ("scene triangles", bytemuck::cast_slice(&layout.triangles)),
             (
@@ -284,6 +292,7 @@ impl SceneBuffers {
             ("scene hierarchy", bytemuck::cast_slice(&nodes)),
             ("scene edges", bytemuck::cast_slice(&adjacency.edges)),
             ("scene points", bytemuck::cast_slice(&adjacency.points)),
+            ("scene neighbours", bytemuck::cast_slice(&neighbours)),
         ];
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         for ((name, bytes), desc) in images.into_iter().zip(self.sizes.images) {
@@ -440,6 +449,7 @@ impl SceneBuffers {
             hierarchy: image("scene.hierarchy", 4),
             edges: image("scene.edges", 5),
             points: image("scene.points", 6),
+            neighbours: image("scene.neighbours", 7),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The passes that work on the lists.
 
-use super::{Lists, NAME, ShaftOptions, Sizes, texels};
+use super::{Lists, NAME, Sizes, texels};
 use crate::geometry::{TILE_SIZE, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferId, Graph, ImageId, PassKind, Stage};
@@ -8,14 +8,18 @@ use crate::shadow::{ShadowInputs, shape_number};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-/// Most runs of nodes in a dispatch: what devices allow along an axis.
-pub(super) const MOST_RUNS: u32 = 65_535;
+/// Most workgroups along an axis that every device allows.
+const MOST_GROUPS: u32 = 65_535;
+
+/// Runs of nodes that one dispatch works on; it has a workgroup for each and each block of samples.
+pub(super) fn runs_in_dispatch(nodes: u32, sizes: &Sizes) -> u32 {
+    (nodes / sizes.run_nodes + 1).min(MOST_GROUPS / sizes.blocks)
+}
 
 /// `Push` of `shaft_masks/masks.comp`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 struct Push {
-    step: u32,
     first_run: u32,
     run: u32,
 }
@@ -33,7 +37,6 @@ enum Step {
 
 /// What the passes share.
 pub(super) struct Masks {
-    pub options: ShaftOptions,
     pub sizes: Sizes,
     /// Nodes of the hierarchy.
     pub nodes: u32,
@@ -52,33 +55,17 @@ impl Masks {
     ) -> ImageId {
         let name = &inputs.light_name;
         let [across, down] = tile_counts(inputs.camera.size());
-        let words = across * down * TILE_SIZE * TILE_SIZE * self.options.side.pow(2) / 32;
+        let words = across * down * TILE_SIZE * TILE_SIZE * 2 * self.sizes.blocks;
         let words = texels(vk::Format::R32_UINT, words);
         let words = graph.create_image(format!("{NAME}.words {name}"), words);
         let mut made = (visibility, words);
         let runs = self.nodes / self.sizes.run_nodes + 1;
-        let walks = (0..runs).step_by(MOST_RUNS as usize).map(Step::Walk);
+        let in_one = runs_in_dispatch(self.nodes, &self.sizes) as usize;
+        let walks = (0..runs).step_by(in_one).map(Step::Walk);
         for step in [Step::Tiles, Step::Further].into_iter().chain(walks) {
             made = self.add_pass(graph, inputs, made, step);
         }
-        let Lists {
-            further, partial, ..
-        } = self.lists;
-        for (arguments, is_partial) in [(further, false), (partial.arguments, true)] {
-            made.0 = self.add_resolve(graph, inputs, made, arguments, is_partial);
-        }
-        made.0
-    }
-
-    /// Specialization constants of all passes.
-    fn constants(&self, inputs: &ShadowInputs<'_>) -> Vec<(u32, u32)> {
-        vec![
-            (0, shape_number(&inputs.light.shape)),
-            (1, self.options.side),
-            (2, self.options.side),
-            (3, u32::from(inputs.scene.has_masks())),
-            (4, self.sizes.task_chunks),
-        ]
+        self.add_resolve(graph, inputs, made)
     }
 
     fn add_pass(
@@ -94,8 +81,9 @@ impl Masks {
         let (params, shafts) = (self.params, self.shafts);
         let Lists {
             tiles,
-            pool,
             lists,
+            edges,
+            triangles,
             further,
             tasks,
             partial,
@@ -114,7 +102,8 @@ impl Masks {
             ids.triangles,
             ids.hierarchy,
             shafts,
-            pool,
+            edges,
+            triangles,
             lists,
             tasks,
             list,
@@ -130,18 +119,19 @@ impl Masks {
         } else {
             pass.write(words, Access::StorageReadWrite(Stage::Compute))
         };
-        let constants = self.constants(inputs);
         let run = self.sizes.run_nodes;
         let (step, first_run) = match step {
             Step::Tiles => (0, 0),
             Step::Further => (1, 0),
             Step::Walk(first_run) => (2, first_run),
         };
-        let push = Push {
-            step,
-            first_run,
-            run,
-        };
+        let push = Push { first_run, run };
+        let constants = vec![
+            (0, shape_number(&inputs.light.shape)),
+            (1, step),
+            (3, u32::from(inputs.scene.has_masks())),
+            (4, self.sizes.task_entries),
+        ];
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -157,11 +147,12 @@ impl Masks {
                 Bind::uniform(9, arguments),
                 Bind::sampled(10, list, nearest),
                 Bind::sampled(11, shafts, nearest),
-                Bind::sampled(12, pool, nearest),
+                Bind::sampled(12, edges, nearest),
                 Bind::sampled(13, lists, nearest),
                 Bind::storage_image(14, visibility),
                 Bind::sampled(15, tasks, nearest),
                 Bind::storage_image(16, words),
+                Bind::sampled(17, triangles, nearest),
             ];
             let pipeline = ComputePipelineDesc {
                 constants,
@@ -178,45 +169,34 @@ impl Masks {
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
         (visibility, words): (ImageId, ImageId),
-        arguments: BufferId,
-        is_partial: bool,
     ) -> ImageId {
         let name = &inputs.light_name;
         let params = self.params;
-        let Lists {
-            lists,
-            tasks,
-            partial,
-            ..
-        } = self.lists;
+        let Lists { tiles, lists, .. } = self.lists;
         let mut pass = graph.pass(format!("{NAME}.resolve {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
-        pass.read(arguments, Access::Indirect);
-        pass.read(arguments, Access::Uniform(Stage::Compute));
-        for image in [tasks, lists, words, partial.tiles] {
+        tiles.read(&mut pass);
+        for image in [lists, words] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
-        let mut constants = self.constants(inputs);
-        constants.retain(|(id, _)| matches!(id, 1 | 2 | 4));
+        let task_entries = self.sizes.task_entries;
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let pipeline = ComputePipelineDesc {
-                constants,
+                constants: vec![(4, task_entries)],
                 ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_RESOLVE_COMP)
             };
             let bindings = [
                 Bind::uniform(0, params),
-                Bind::uniform(1, arguments),
-                Bind::sampled(2, tasks, nearest),
+                Bind::uniform(1, tiles.arguments),
+                Bind::sampled(2, tiles.tiles, nearest),
                 Bind::sampled(3, lists, nearest),
                 Bind::sampled(4, words, nearest),
                 Bind::storage_image(5, visibility),
-                Bind::sampled(6, partial.tiles, nearest),
             ];
-            let push = u32::from(is_partial);
-            ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
-            ctx.dispatch_indirect(arguments, 0)
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            tiles.dispatch(ctx)
         });
         visibility
     }

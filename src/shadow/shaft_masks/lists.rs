@@ -1,0 +1,228 @@
+//! The passes that find what is between tiles and the light.
+
+use super::{LIST_TEXELS, Lists, NAME, POOL_WIDTH, Sizes, masks, texels};
+use crate::geometry::{TileList, tile_counts};
+use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
+use crate::graph::{
+    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
+};
+use crate::shadow::receivers::Receivers;
+use crate::shadow::{ShadowInputs, shape_number};
+use ash::vk;
+
+/// What the passes share.
+pub(super) struct Making {
+    pub params: BufferId,
+    pub shafts: ImageId,
+    pub sizes: Sizes,
+}
+
+/// Candidates of tiles, between the two passes.
+struct Candidates {
+    tiles: TileList,
+    lists: ImageId,
+    pool: ImageId,
+    used: BufferId,
+    further: BufferId,
+    partial: TileList,
+}
+
+impl Making {
+    /// Declares the passes; returns the lists, and the visibility of the tiles settled so far.
+    pub(super) fn add(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        receivers: &Receivers,
+    ) -> (Lists, ImageId) {
+        let (candidates, visibility) = self.add_candidates(graph, inputs, receivers);
+        self.add_entries(graph, inputs, candidates, visibility)
+    }
+
+    fn add_candidates(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        receivers: &Receivers,
+    ) -> (Candidates, ImageId) {
+        let name = &inputs.light_name;
+        let size = inputs.camera.size();
+        let [across, down] = tile_counts(size);
+        let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
+        let mut penumbra = TileList::create(graph, &format!("{NAME}.penumbra {name}"), size);
+        let mut partial = TileList::create(graph, &format!("{NAME}.partial {name}"), size);
+        let sixteen = BufferDesc { size: 16 };
+        let used = graph.create_buffer(format!("{NAME}.used {name}"), sixteen);
+        let further = graph.create_buffer(format!("{NAME}.further {name}"), sixteen);
+        let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
+        penumbra.clear(&mut pass);
+        partial.clear(&mut pass);
+        let used = pass.overwrite(used, Access::Clear);
+        let further = pass.overwrite(further, Access::Clear);
+        let runs = masks::runs_in_dispatch(inputs.scene.node_count() as u32, &sizes);
+        // Workgroups across, down, and for each block of samples; number of entries.
+        let none = [0u32, 1, sizes.blocks, 0];
+        let no_partial = [0u32, 1, runs * sizes.blocks, 0];
+        let arguments = [
+            (penumbra.arguments, none),
+            (further, none),
+            (partial.arguments, no_partial),
+            (used, [0; 4]),
+        ];
+        pass.record(move |ctx| {
+            for (buffer, values) in arguments {
+                ctx.update_buffer(buffer, 0, bytemuck::cast_slice(&values))?;
+            }
+            Ok(())
+        });
+
+        let pool = texels(vk::Format::R32_UINT, sizes.pool_rows * POOL_WIDTH);
+        let pool = graph.create_image(format!("{NAME}.pool {name}"), pool);
+        let format = vk::Format::R32G32B32A32_UINT;
+        let desc = ImageDesc::new(format, across * LIST_TEXELS, down);
+        let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
+        let hierarchy = inputs.ids.hierarchy;
+        let (view_params, part) = inputs.view_params;
+        let tiles = receivers.list;
+        let shape = shape_number(&inputs.light.shape);
+        let mut pass = graph.pass(format!("{NAME}.lists {name}"), PassKind::Compute);
+        pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+        pass.read(params, Access::Uniform(Stage::Compute));
+        for image in [hierarchy, shafts] {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+        tiles.read(&mut pass);
+        penumbra.fill(&mut pass);
+        let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
+        let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
+        let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
+        let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let bindings = [
+                Bind::uniform(0, view_params).part(part),
+                Bind::uniform(1, params),
+                Bind::sampled(2, hierarchy, nearest),
+                Bind::uniform(3, tiles.arguments),
+                Bind::sampled(4, tiles.tiles, nearest),
+                Bind::sampled(5, shafts, nearest),
+                Bind::storage_buffer(6, penumbra.arguments),
+                Bind::storage_image(7, penumbra.tiles),
+                Bind::storage_buffer(8, used),
+                Bind::storage_image(9, pool),
+                Bind::storage_image(10, lists),
+                Bind::storage_image(11, visibility),
+            ];
+            let shader = &spirv::SHAFT_MASKS_LISTS_COMP;
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(0, shape)],
+                ..ComputePipelineDesc::new(shader)
+            };
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            ctx.dispatch(shader.groups([across * down, 1, 1]));
+            Ok(())
+        });
+        let candidates = Candidates {
+            tiles: penumbra,
+            lists,
+            pool,
+            used,
+            further,
+            partial,
+        };
+        (candidates, visibility)
+    }
+
+    fn add_entries(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        candidates: Candidates,
+        visibility: ImageId,
+    ) -> (Lists, ImageId) {
+        let name = &inputs.light_name;
+        let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
+        let Candidates {
+            tiles,
+            lists,
+            pool,
+            used,
+            further,
+            mut partial,
+        } = candidates;
+        let edges = texels(vk::Format::R32_UINT, sizes.edge_rows * POOL_WIDTH);
+        let edges = graph.create_image(format!("{NAME}.edges {name}"), edges);
+        let triangles = texels(vk::Format::R32_UINT, sizes.pool_rows * POOL_WIDTH);
+        let triangles = graph.create_image(format!("{NAME}.triangles {name}"), triangles);
+        let tasks = sizes.pool_rows * POOL_WIDTH / sizes.task_entries;
+        let tasks = texels(vk::Format::R32G32B32A32_UINT, tasks);
+        let tasks = graph.create_image(format!("{NAME}.tasks {name}"), tasks);
+        let (ids, tile_bounds) = (inputs.ids, inputs.tile_bounds);
+        let view_depth = inputs.gbuffer.view_depth;
+        let (view_params, part) = inputs.view_params;
+        let shape = shape_number(&inputs.light.shape);
+        let mut pass = graph.pass(format!("{NAME}.entries {name}"), PassKind::Compute);
+        pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+        pass.read(params, Access::Uniform(Stage::Compute));
+        let images = [
+            tile_bounds,
+            ids.triangles,
+            ids.neighbours,
+            shafts,
+            view_depth,
+            pool,
+        ];
+        for image in images {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+        tiles.read(&mut pass);
+        partial.fill(&mut pass);
+        let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
+        let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
+        let further = pass.write(further, Access::StorageReadWrite(Stage::Compute));
+        let edges = pass.overwrite(edges, Access::StorageWrite(Stage::Compute));
+        let triangles = pass.overwrite(triangles, Access::StorageWrite(Stage::Compute));
+        let tasks = pass.overwrite(tasks, Access::StorageWrite(Stage::Compute));
+        let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let bindings = [
+                Bind::uniform(0, view_params).part(part),
+                Bind::uniform(1, params),
+                Bind::sampled(2, tile_bounds, nearest),
+                Bind::sampled(3, ids.triangles, nearest),
+                Bind::sampled(4, ids.neighbours, nearest),
+                Bind::uniform(5, tiles.arguments),
+                Bind::sampled(6, tiles.tiles, nearest),
+                Bind::sampled(7, shafts, nearest),
+                Bind::sampled(8, pool, nearest),
+                Bind::storage_image(9, lists),
+                Bind::storage_buffer(10, used),
+                Bind::storage_image(11, edges),
+                Bind::storage_image(12, triangles),
+                Bind::storage_image(13, visibility),
+                Bind::sampled(14, view_depth, nearest),
+                Bind::storage_buffer(15, further),
+                Bind::storage_image(16, tasks),
+                Bind::storage_buffer(17, partial.arguments),
+                Bind::storage_image(18, partial.tiles),
+            ];
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(0, shape), (4, sizes.task_entries)],
+                ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_ENTRIES_COMP)
+            };
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            tiles.dispatch(ctx)
+        });
+        let lists = Lists {
+            tiles,
+            lists,
+            edges,
+            triangles,
+            further,
+            tasks,
+            partial,
+        };
+        (lists, visibility)
+    }
+}

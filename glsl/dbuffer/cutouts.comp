@@ -76,7 +76,7 @@ void main() {
         vec4 low = fetch_node_low(node);
         uint next = node + 1u;
         if (low.w < 0.0) {
-            next = shaft_meets_box(shaft, low.xyz, fetch_node_high(node)) ? next : uint(-low.w);
+            next = shaft_meets_box(shaft, low.xyz, fetch_node_high(node).xyz) ? next : uint(-low.w);
         } else if (material_is_masked(fetch_triangle_texel(4u * uint(low.w) + 3u).w)) {
             uint triangle = uint(low.w);
             vec3 a = fetch_triangle_texel(4u * triangle).xyz;

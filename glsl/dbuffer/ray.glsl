@@ -41,7 +41,7 @@ bool ray_is_blocked(vec3 p, vec3 to, bool sun, uint nodes, float rounding_m) {
         } else {
             // Boxes wider by the rounding: those of level triangles are flat.
             vec3 near = (low.xyz - rounding_m - p) * inverse;
-            vec3 far = (fetch_node_high(node) + rounding_m - p) * inverse;
+            vec3 far = (fetch_node_high(node).xyz + rounding_m - p) * inverse;
             vec3 first = min(near, far);
             vec3 last = max(near, far);
             float enter = max(first.x, max(first.y, max(first.z, 0.0)));

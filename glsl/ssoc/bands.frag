@@ -34,7 +34,7 @@ void main() {
     vec2 at = clamp(floor(map * size_texels), 0.0, size_texels - 1.0);
     float seen = texelFetch(map_depth, ivec2(at), 0).x;
     float own = perspective ? view.scale.z * depth : view.scale.z * depth + view.scale.w;
-    float slack = perspective ? 0.01 * own : 0.002;
+    float slack = perspective ? 1.0e-4 * own : 1.0e-5;
     if (seen > own + slack) {
         discard;
     }

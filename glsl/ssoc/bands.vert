@@ -46,9 +46,12 @@ vec3 in_view(LightView view, uint point) {
     return vec3(dot(q, view.right.xyz), dot(q, view.up.xyz), dot(q, view.forward.xyz));
 }
 
-// Which side of the edge a face is on.
+// Which side of the edge a face is on: sine of the angle between the planes through edge and light
+// and through edge and face, about.
 float face_side(bool perspective, vec3 a, vec3 b, vec3 face) {
-    return perspective ? dot(cross(a, b), face) : cross(b - a, face - a).z;
+    vec3 across = perspective ? cross(a, b) : vec3(a.y - b.y, b.x - a.x, 0.0);
+    vec3 way = face - a;
+    return dot(across, way) / max(length(across) * length(way), 1.0e-37);
 }
 
 void main() {
@@ -71,7 +74,8 @@ void main() {
     ends = vec4(0.0);
     depths = vec4(0.0);
     entry = 0u;
-    if (!clip_edge(view, near, a, b)) {
+    // Where the light's centre lies in all of its faces' planes, an edge has no side.
+    if (abs(faces) < 1.0e-5 || !clip_edge(view, near, a, b)) {
         return;
     }
     vec2 p = perspective ? a.xy / a.z : a.xy;

@@ -110,7 +110,6 @@ float soft_cells(Place here, LightView light_view) {
     float depth = 0.0;
     float result = 1.0;
     float change = 0.0;
-    bool hidden = false;
     for (uint cell = 0u; cell < LOOKUPS; ++cell) {
         vec2 middle = cell_middle(cell);
         float passed = depth;
@@ -124,7 +123,7 @@ float soft_cells(Place here, LightView light_view) {
                 seen = cell_past(chord, middle);
                 break;
             }
-            bool blocked = blocked_at(here, map);
+            bool blocked = cell == 0u ? here.hidden : blocked_at(here, map);
             if (MASKED == 0u && cell > 0u && blocked) {
                 blocked = still_blocked(here, light_view, middle, map, passed);
             }
@@ -133,8 +132,7 @@ float soft_cells(Place here, LightView light_view) {
             hard = blocked ? 0.0 : 1.0;
             // Without an outline near, it is as at the receiver's own place, or else as the first
             // edge has it.
-            hidden = cell == 0u ? blocked : hidden;
-            seen = MASKED != 0u || blocked == hidden ? hard : cell_past(chord, middle);
+            seen = MASKED != 0u || blocked == here.hidden ? hard : cell_past(chord, middle);
             if (cell > 0u && (near_entry & EDGE_NUMBER) == first && far_entry == 0u) {
                 seen = first == 0u && MASKED != 0u ? hard : cell_past(chord, middle);
                 break;
@@ -147,7 +145,7 @@ float soft_cells(Place here, LightView light_view) {
                 if (wide.number == 0u) {
                     vec2 searched = MASKED != 0u ? searched_depth(here, light_view) : vec2(0.0);
                     if (searched.y == 0.0) {
-                        return blocked && blocked_around(here) ? 0.0 : 1.0;
+                        return hard;
                     }
                     depth = searched.x;
                 }

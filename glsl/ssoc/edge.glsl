@@ -4,10 +4,10 @@
 
 #include "common/light_above.glsl"
 #include "common/view_params.glsl"
+#include "hard/hard.glsl"
 #include "silhouettes/edges.glsl"
 #include "ssoc/params.glsl"
 
-const float DEPTH_ROUNDING = 1.0 / 1048576.0;
 // What heights over the receiver's plane are rounded by, as a part of the coordinates.
 const float PLANE_ROUNDING = 4.0e-6;
 // What the stored normal is rounded by, as an angle.
@@ -33,6 +33,7 @@ struct Place {
     vec3 plane;  // stored depth of the receiver's plane, and its change across the map
     vec2 map;    // its place in the map
     uint view;
+    bool hidden; // the light's centre
     LightDisk light;
 };
 
@@ -96,29 +97,16 @@ float map_depth_at(Place here, vec2 map) {
     return fetch_map_depth(texel_of(here, map, params.counts.y));
 }
 
-// Whether a texel of the map shows something in front of the receiver's plane. Where the light's
+// Whether a place of the map shows something in front of the receiver's plane. Where the light's
 // centre is below that plane, what the map shows there is below it too.
-bool blocked_in(Place here, ivec3 texel) {
+bool blocked_at(Place here, vec2 map) {
     float size = float(params.counts.y);
+    ivec3 texel = texel_of(here, map, params.counts.y);
     vec2 apart = (vec2(texel.xy) + 0.5) / size - here.map;
     float expected = here.plane.x + dot(here.plane.yz, apart);
     float slack = (abs(here.plane.y) + abs(here.plane.z)) / size * SNAP_TEXELS
         + abs(here.plane.x) * DEPTH_ROUNDING;
     return dot(here.n, here.light.center) > 0.0 && fetch_map_depth(texel) > expected + slack;
-}
-
-bool blocked_at(Place here, vec2 map) {
-    return blocked_in(here, texel_of(here, map, params.counts.y));
-}
-
-// Whether all four texels around the receiver's own place are blocked. Where no outline is near, a
-// texel of the wall that a floor ends at says nothing about the floor before it.
-bool blocked_around(Place here) {
-    vec2 offset = vec2(0.5 / float(params.counts.y), 0.0);
-    return blocked_at(here, here.map - offset.xx)
-        && blocked_at(here, here.map + offset.xx)
-        && blocked_at(here, here.map + offset.xy - offset.yx)
-        && blocked_at(here, here.map - offset.xy + offset.yx);
 }
 
 vec3 in_view(LightView light_view, vec3 q) {
@@ -176,8 +164,7 @@ Seen look_at(Place here, LightView light_view, uint entry, vec2 from_place) {
     float handed = dot(cross(light_view.right.xyz, light_view.up.xyz), light_view.forward.xyz);
     vec3 normal = cross(first - here.p, second - here.p) * (side * handed > 0.0 ? -1.0 : 1.0);
     float length_m2 = length(normal);
-    bool has_size = LIGHT_SHAPE != LIGHT_POINT && length_m2 > 0.0;
-    found.chord = has_size
+    found.chord = length_m2 > 0.0
         ? light_chord(here.light, normal / length_m2)
         : vec3(found.delta > 0.0 ? 1.0 : -1.0, 1.0, 0.0);
     return found;

@@ -49,6 +49,11 @@ bool clip_edge(LightView view, float near, inout vec3 a, inout vec3 b) {
     if (view.forward.w <= 0.0) {
         return true;
     }
+    // Seen end on, an edge bounds nothing, and which way it faces is rounding.
+    vec3 line = cross(a, b);
+    if (dot(line, line) <= 1.0e-12 * dot(b - a, b - a) * max(dot(a, a), dot(b, b))) {
+        return false;
+    }
     vec2 corner = vec2(view.right.w, view.up.w);
     vec2 other = corner + 1.0 / view.scale.xy;
     vec2 middle = 0.5 * (corner + other);

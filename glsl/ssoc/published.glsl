@@ -38,12 +38,11 @@ float combined(Seen a, Seen b, float seen) {
 }
 
 float soft_published(Place here, LightView light_view) {
-    bool blocked = blocked_at(here, here.map);
-    uint entry = edge_at(here, here.map, blocked);
+    uint entry = edge_at(here, here.map, here.hidden);
     // Far from any edge the map alone decides.
     Seen first = look_at(here, light_view, entry, here.at);
     if (first.number == 0u) {
-        return blocked && blocked_around(here) ? 0.0 : 1.0;
+        return here.hidden ? 0.0 : 1.0;
     }
     float texel = band_texel(light_view);
     float seen = seen_past(first);

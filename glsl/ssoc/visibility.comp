@@ -3,27 +3,27 @@
 // a receiver's place in the light's image leave free.
 
 #include "common/combine.glsl"
+#include "common/materials.glsl"
 #include "common/octahedral.glsl"
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
+#include "hard/hard.glsl"
 #include "ssoc/params.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-layout(constant_id = 0) const uint LIGHT_SHAPE = 0u;
-layout(constant_id = 1) const uint LOOKUPS = 13u;
+// 0 and 1: SNAP_TEXELS and MASKED of hard/hard.glsl.
+layout(constant_id = 2) const uint LIGHT_SHAPE = 0u;
+layout(constant_id = 3) const uint LOOKUPS = 13u;
 // How several edges join: Combine of the library.
-layout(constant_id = 2) const uint COMBINE = 0u;
+layout(constant_id = 4) const uint COMBINE = 0u;
 const uint COMBINE_CELLS = 0u;
 const uint COMBINE_PRODUCT = 2u;
 const uint COMBINE_MIN = 3u;
 const uint COMBINE_AND = 4u;
 const uint COMBINE_OR = 5u;
 // 1: 3 t^2 - 2 t^3 instead of the disk's area.
-layout(constant_id = 3) const uint CUBIC = 0u;
-layout(constant_id = 4) const float SNAP_TEXELS = 4.0 / 256.0;
-// 1 where triangles of the scene may have holes, whose outlines are no edges.
-layout(constant_id = 5) const uint MASKED = 0u;
+layout(constant_id = 5) const uint CUBIC = 0u;
 
 layout(set = 0, binding = 0, std140) uniform View {
     ViewParams view;
@@ -42,6 +42,12 @@ layout(set = 0, binding = 9, std140) uniform Arguments {
     TileArguments arguments;
 };
 layout(set = 0, binding = 10) uniform usampler2D list;
+layout(set = 0, binding = 11) uniform usampler2DArray map_ids;
+layout(set = 0, binding = 12) uniform usampler2D ids;
+layout(set = 0, binding = 13) uniform sampler2D triangles;
+layout(set = 0, binding = 14) uniform sampler2D materials;
+layout(set = 0, binding = 15) uniform sampler2D uvs;
+layout(set = 0, binding = 16) uniform sampler2D texels;
 
 #include "ssoc/cells.glsl"
 #include "ssoc/published.glsl"
@@ -55,7 +61,27 @@ vec4 fetch_point_texel(ivec2 at) {
 }
 
 vec4 fetch_triangle_texel(uint texel) {
-    return vec4(0.0);
+    return texelFetch(triangles, triangle_texel_place(texel), 0);
+}
+
+vec4 fetch_material_texel(ivec2 at) {
+    return texelFetch(materials, at, 0);
+}
+
+vec4 fetch_uv_texel(ivec2 at) {
+    return texelFetch(uvs, at, 0);
+}
+
+vec4 fetch_texture_texel(ivec2 at) {
+    return texelFetch(texels, at, 0);
+}
+
+vec4 gather_map_depths(vec2 at, uint index) {
+    return textureGather(map_depth, vec3(at, float(index)));
+}
+
+uvec4 gather_map_ids(vec2 at, uint index) {
+    return textureGather(map_ids, vec3(at, float(index)));
 }
 
 uint fetch_map_edge(ivec3 texel) {
@@ -88,11 +114,24 @@ float pixel_visibility(uvec2 pixel) {
             vec2 in_units = at.xy / light_view.scale.xy + vec2(light_view.right.w, light_view.up.w);
             float z = dot(q, light_view.forward.xyz);
             float stored = light_view.forward.w > 0.0 ? 1.0 / z : z;
+            // Whether the light's centre is hidden is exact: a texel of the wall that a floor ends at
+            // says nothing about the floor before it. A centre below the receiver's plane counts as
+            // free, for that part of the light is taken off in any case.
+            vec3 to_light = light_offset(view.light, p);
+            bool sun = view.light.center.w == 0.0;
+            Receiver receiver = Receiver(p, n, to_light, sun, texelFetch(ids, ivec2(pixel), 0).x);
+            bool facing = dot(n, to_light) > 0.0;
+            float texels_across = float(params.counts.y);
+            bool hidden = facing
+                && hard_visibility(receiver, light_view, found, at.xy, texels_across) == 0.0;
             LightDisk disk = light_disk(view.light, LIGHT_SHAPE, p, light_view.right.xyz);
-            Place here = Place(p, n, in_units, stored, plane, at.xy, found, disk);
-            float seen = COMBINE == COMBINE_CELLS
-                ? soft_cells(here, light_view)
-                : soft_published(here, light_view);
+            Place here = Place(p, n, in_units, stored, plane, at.xy, found, hidden, disk);
+            float seen = hidden ? 0.0 : 1.0;
+            if (LIGHT_SHAPE != LIGHT_POINT) {
+                seen = COMBINE == COMBINE_CELLS
+                    ? soft_cells(here, light_view)
+                    : soft_published(here, light_view);
+            }
             result = visibility_and(seen, above, 0.0);
         }
     }

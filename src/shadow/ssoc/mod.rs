@@ -20,7 +20,7 @@
 //! | pass | makes |
 //! |---|---|
 //! | `params` | views |
-//! | `map` | depths seen from the light's centre |
+//! | `map` | depths and triangles seen from the light's centre |
 //! | `silhouettes.*` | the list of edges ([`super::silhouettes`]) |
 //! | `bands` | the outer and the inner distortion map of a view |
 //! | `start`, `tiles` | the picture's tiles that need work |
@@ -31,7 +31,7 @@ mod options;
 pub use options::{Combine, SsocOptions};
 
 use super::light_view::{LightView, LightViews, MAX_LIGHT_VIEWS, light_views};
-use super::map::add_maps_of_size;
+use super::map::{ShadowMap, add_maps_of_size};
 use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
 use super::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
@@ -123,10 +123,10 @@ pub(super) fn add_passes<'f>(
         }
     }
     let buffer = add_params(graph, inputs, params);
-    let depth = DrawTarget::Depth;
-    let map = add_maps_of_size(graph, inputs, NAME, &views, depth, options.resolution).depth;
+    let target = DrawTarget::Ids;
+    let map = add_maps_of_size(graph, inputs, NAME, &views, target, options.resolution);
     let list = add_silhouettes(graph, inputs, NAME, SilhouetteRule::Center, VERTICES);
-    let bands = add_bands(graph, inputs, &options, &views, buffer, map, list);
+    let bands = add_bands(graph, inputs, &options, &views, buffer, map.depth, list);
     add_visibility(graph, inputs, &options, buffer, map, bands)
 }
 
@@ -236,9 +236,16 @@ fn add_visibility<'f>(
     inputs: &ShadowInputs<'f>,
     options: &SsocOptions,
     params: BufferId,
-    map: ImageId,
+    map: ShadowMap,
     bands: ImageId,
 ) -> ShadowMask {
+    let ShadowMap {
+        depth: map_depth,
+        ids: Some(map_ids),
+    } = map
+    else {
+        unreachable!("triangle numbers were asked for");
+    };
     let name = &inputs.light_name;
     let receivers = add_receivers(graph, inputs, NAME, reach(&inputs.light));
     let list = receivers.list;
@@ -250,12 +257,15 @@ fn add_visibility<'f>(
     let images = [
         gbuffer.view_depth,
         gbuffer.geometric_normal,
-        map,
+        gbuffer.ids,
+        map_depth,
+        map_ids,
         bands,
         ids.edges,
         ids.points,
+        ids.triangles,
     ];
-    for image in images {
+    for image in images.into_iter().chain(ids.mask_images()) {
         pass.read(image, Access::Sampled(Stage::Compute));
     }
     list.read(&mut pass);
@@ -270,24 +280,30 @@ fn add_visibility<'f>(
             Bind::uniform(1, params),
             Bind::sampled(2, gbuffer.view_depth, nearest),
             Bind::sampled(3, gbuffer.geometric_normal, nearest),
-            Bind::sampled(4, map, nearest).array(),
+            Bind::sampled(4, map_depth, nearest).array(),
             Bind::sampled(5, bands, nearest).array(),
             Bind::sampled(6, ids.edges, nearest),
             Bind::sampled(7, ids.points, nearest),
             Bind::storage_image(8, visibility),
             Bind::uniform(9, list.arguments),
             Bind::sampled(10, list.tiles, nearest),
+            Bind::sampled(11, map_ids, nearest).array(),
+            Bind::sampled(12, gbuffer.ids, nearest),
+            Bind::sampled(13, ids.triangles, nearest),
+            Bind::sampled(14, ids.materials, nearest),
+            Bind::sampled(15, ids.triangle_uvs, nearest),
+            Bind::sampled(16, ids.texels, nearest),
         ];
         let steps = ctx.gpu().info().limits.sub_pixel_precision_bits.min(16);
         let snap = 4.0 / (1u32 << steps) as f32;
         let pipeline = ComputePipelineDesc {
             constants: vec![
-                (0, shape),
-                (1, options.lookups),
-                (2, options.combine as u32),
-                (3, u32::from(options.cubic)),
-                (4, snap.to_bits()),
-                (5, masked),
+                (0, snap.to_bits()),
+                (1, masked),
+                (2, shape),
+                (3, options.lookups),
+                (4, options.combine as u32),
+                (5, u32::from(options.cubic)),
             ],
             ..ComputePipelineDesc::new(&spirv::SSOC_VISIBILITY_COMP)
         };

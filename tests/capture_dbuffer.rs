@@ -5,7 +5,7 @@ mod support;
 
 use antumbra::capture::{FrameRenderer, FrameRequest};
 use antumbra::light::{AreaLight, LightShape};
-use antumbra::scene::{Primitive, Scene};
+use antumbra::scene::{AlphaMode, Material, Primitive, Scene};
 use glam::Vec3;
 use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, scene};
 
@@ -319,4 +319,33 @@ fn a_light_of_no_size_is_hard_and_nothing_is_full_light() {
         &["dbuffer"],
     );
     assert!(covered[0].iter().all(|v| *v == 0.0));
+}
+
+/// Triangles with holes have no silhouettes: they hide samples of the light.
+#[test]
+fn cut_outs_hide_what_is_not_a_hole() {
+    let _one = support::serial();
+    let plates = [
+        (5.0, [-0.3, 0.2], [-0.4, 0.4]),
+        (4.0, [0.3, 0.9], [-0.4, 0.6]),
+    ];
+    let mut scene = under(&plates, DISK);
+    let places = places(DISK, 10_000);
+    for (alpha, shown) in [(0.9, 2), (0.1, 1)] {
+        scene.materials.truncate(1);
+        scene.materials.push(Material {
+            alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+            base_color: glam::Vec4::new(1.0, 1.0, 1.0, alpha),
+            ..Material::default()
+        });
+        scene.primitives[2].material = 1;
+        scene.finish().unwrap();
+        let image = &render(&scene, &["dbuffer"])[0];
+        let (light, solid) = (scene.lights[0].light, &plates[..shown]);
+        let found = errors(image, 3, |p| {
+            truth(p, &light, &places, |p, way| meets_plates(solid, p, way))
+        });
+        println!("cut out, alpha {alpha}: {found:?}");
+        assert!(found.0 <= 0.02, "alpha {alpha}: {found:?}");
+    }
 }

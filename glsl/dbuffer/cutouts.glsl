@@ -20,8 +20,14 @@ vec4 at_samples(vec3 line, uint i) {
     return line.x * params.samples[2u * i] + line.y * params.samples[2u * i + 1u] + line.z;
 }
 
-// Sets the samples that the triangle hides to 1.
-void add_cutout(CoverageReceiver r, uint triangle, inout vec4 cut_out[FOURS]) {
+// Four bits where numbers are at least 0.
+uint bits_of(vec4 numbers) {
+    uvec4 is_set = uvec4(greaterThanEqual(numbers, vec4(0.0)));
+    return is_set.x | is_set.y << 1 | is_set.z << 2 | is_set.w << 3;
+}
+
+// Takes the samples that the triangle hides out of those still seen: a bit for each, 32 in a word.
+void add_cutout(CoverageReceiver r, uint triangle, inout uvec2 seen) {
     vec3 a = fetch_corner(triangle, 0u).position - r.p;
     vec3 b = fetch_corner(triangle, 1u).position - r.p;
     vec3 c = fetch_corner(triangle, 2u).position - r.p;
@@ -38,21 +44,26 @@ void add_cutout(CoverageReceiver r, uint triangle, inout vec4 cut_out[FOURS]) {
     if (most < 0.0 || abs(height) <= r.rounding_m) {
         return;
     }
-    uint material = material_number(plane.w);
+    uvec2 within = uvec2(0u);
     for (uint i = 0u; i < FOURS; ++i) {
-        vec4 at_a = at_samples(bc, i);
-        vec4 at_b = at_samples(ca, i);
-        vec4 at_c = at_samples(ab, i);
-        vec4 least = min(min(at_a, at_b), min(at_c, at_samples(before, i)));
-        least = mix(least, vec4(-1.0), greaterThan(cut_out[i], vec4(0.0)));
-        for (uint j = 0u; j < 4u; ++j) {
-            if (least[j] >= 0.0) {
-                vec3 weights = vec3(at_a[j], at_b[j], at_c[j]);
-                float sum = weights.x + weights.y + weights.z;
-                weights = sum != 0.0 ? weights / sum : vec3(1.0, 0.0, 0.0);
-                cut_out[i][j] = is_hole(material, fetch_uv(triangle, weights)) ? 0.0 : 1.0;
-            }
-        }
+        vec4 least = min(min(at_samples(bc, i), at_samples(ca, i)), min(at_samples(ab, i), at_samples(before, i)));
+        uint bits = bits_of(least);
+        within.x |= i < 8u ? bits << (4u * i & 31u) : 0u;
+        within.y |= i < 8u ? 0u : bits << (4u * i & 31u);
+    }
+    within &= seen;
+    uint material = material_number(plane.w);
+    while ((within.x | within.y) != 0u) {
+        uint sample_index = within.x != 0u ? uint(findLSB(within.x)) : 32u + uint(findLSB(within.y));
+        uint fours = sample_index / 4u;
+        vec3 place = vec3(params.samples[2u * fours][sample_index % 4u],
+            params.samples[2u * fours + 1u][sample_index % 4u], 1.0);
+        vec3 weights = vec3(dot(bc, place), dot(ca, place), dot(ab, place));
+        float sum = weights.x + weights.y + weights.z;
+        weights = sum != 0.0 ? weights / sum : vec3(1.0, 0.0, 0.0);
+        uvec2 bit = sample_index < 32u ? uvec2(1u << sample_index, 0u) : uvec2(0u, 1u << (sample_index - 32u));
+        seen &= is_hole(material, fetch_uv(triangle, weights)) ? uvec2(0xffffffffu) : ~bit;
+        within &= ~bit;
     }
 }
 

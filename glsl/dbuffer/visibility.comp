@@ -109,13 +109,13 @@ void add_edges(uint tile, uint tiles, CoverageReceiver r, inout Coverage found) 
 }
 
 // All of a tile's triangles with holes.
-void add_cutouts(uint tile, uint tiles, CoverageReceiver r, inout vec4 cut_out[FOURS]) {
+void add_cutouts(uint tile, uint tiles, CoverageReceiver r, inout uvec2 seen) {
     uvec4 stored = texelFetch(lists, list_place(params.sizes.x, tile, tiles), 0);
     uint chunk = stored.x;
     uint slot = 0u;
     uint rest = stored.y;
     uint node = stored.z;
-    while (rest > 0u || node < stored.w) {
+    while ((rest > 0u || node < stored.w) && (seen.x | seen.y) != 0u) {
         uint triangle = 0u;
         bool found = rest > 0u;
         if (found) {
@@ -133,7 +133,7 @@ void add_cutouts(uint tile, uint tiles, CoverageReceiver r, inout vec4 cut_out[F
             node += 1u;
         }
         if (found) {
-            add_cutout(r, triangle, cut_out);
+            add_cutout(r, triangle, seen);
         }
     }
 }
@@ -192,13 +192,22 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
         target = r.from;
     }
     bool center_seen = center_above && texelFetch(hard, ivec2(pixel), 0).x > 0.0;
-    // A part of the light between samples may have fewer still.
-    bool sliver = whole && !center_seen && fewest == 0.0 && found.lighter > 0.0;
-    fewest = sliver ? -found.fewer : fewest;
-    target = sliver ? found.beyond : target;
-    // Where the centre is seen and nothing has fewer layers, there are none before the centre.
+    // Where the centre is seen and nothing has fewer layers, there are none before the centre. Else a ray
+    // to where there are fewest tells whether that is none. If it is not, a part of the light between
+    // the samples may have fewer still.
     bool known = center_seen && fewest == 0.0;
-    if (!known && ray_is_blocked(p, to_light_place(r, target), sun, params.counts.z, rounding_m)) {
+    bool again = whole && fewest == 0.0 && found.lighter > 0.0;
+    for (uint i = 0u; i < 2u && !known; ++i) {
+        known = !ray_is_blocked(p, to_light_place(r, target), sun, params.counts.z, rounding_m);
+        if (!known && again) {
+            again = false;
+            fewest = -found.fewer;
+            target = found.beyond;
+        } else {
+            i = 1u;
+        }
+    }
+    if (!known) {
         return 0.0;
     }
 
@@ -206,16 +215,9 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     // is behind another, the part of the light that they hide is proportional to the mean number, which
     // is known exactly: so the samples' own mean of it, in the proportion that they show, is replaced by
     // the exact one (a control variate).
-    vec4 cut_out[FOURS];
-    for (uint i = 0u; i < FOURS; ++i) {
-        cut_out[i] = vec4(0.0);
-    }
-    if (MASKED != 0u) {
-        add_cutouts(tile, tiles, r, cut_out);
-    }
     float weight = 0.0;
     float hidden = 0.0;
-    float cut_away = 0.0;
+    uvec2 seen = uvec2(0u);
     float mean = 0.0;
     float square = 0.0;
     float both = 0.0;
@@ -225,10 +227,18 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
         vec4 counts = whole ? vec4(1.0) : above_plane(horizon, i);
         weight += dot(counts, vec4(1.0));
         hidden += dot(is_hidden, counts);
-        cut_away += dot(cut_out[i] * (1.0 - is_hidden), counts);
+        uint bits = bits_of(counts - is_hidden - 0.5);
+        seen.x |= i < 8u ? bits << (4u * i & 31u) : 0u;
+        seen.y |= i < 8u ? 0u : bits << (4u * i & 31u);
         mean += dot(layers, counts);
         square += dot(layers * layers, counts);
         both += dot(layers * is_hidden, counts);
+    }
+    float cut_away = 0.0;
+    if (MASKED != 0u) {
+        int before = bitCount(seen.x) + bitCount(seen.y);
+        add_cutouts(tile, tiles, r, seen);
+        cut_away = float(before - bitCount(seen.x) - bitCount(seen.y));
     }
     if (!whole) {
         return above * (weight > 0.0 ? 1.0 - (hidden + cut_away) / weight : 1.0);

@@ -41,9 +41,6 @@ layout(set = 0, binding = 10, std140) uniform RayBlock {
 // Rounding of depths and places, as a part of them: 16 units of single precision's last place.
 const float ROUNDING = 1.0 / 1048576.0;
 
-// Cells of the pyramid that a ray starts in are 2^FIRST_LEVEL texels wide.
-const int FIRST_LEVEL = 1;
-
 // Texels across and down that are looked at one by one, for all rays at once.
 const int MOST_ALIKE = 3;
 
@@ -161,31 +158,30 @@ mat2 pixel_spread(uvec2 pixel, float depth, vec3 n, LightView light_view, vec2 a
         b * (abs(dot(b, sides[0])) + abs(dot(b, sides[1]))));
 }
 
-// Whether a place is on the light's side of the receiver's plane by more than rounding.
-// texels: from the receiver.
-bool in_front(Fan fan, vec2 texels, float s, float margin) {
-    float height = dot(fan.plane, vec3(texels, s - fan.s));
-    return height - margin > fan.rounding.x + fan.rounding.y * abs(s);
+// Whether all that marks boundary k in some texels, from one to another, is on the light's side of the
+// receiver's plane.
+bool is_clear(Fan fan, ivec2 from, ivec2 to, int k) {
+    vec2 low = fan.plane.xy * (vec2(from) - fan.start);
+    vec2 high = fan.plane.xy * (vec2(to + 1) - fan.start);
+    vec2 least = min(low, high);
+    float range = params.options.y != 0u ? 0.501 : 1.001;
+    float s = s_of(fan.places, float(k) + (fan.plane.z > 0.0 ? range : -range));
+    return least.x + least.y + fan.plane.z * (s - fan.s) > fan.rounding.x + fan.rounding.y * abs(s);
 }
 
-// Whether something at a marked boundary of a texel is on the light's side of the receiver's plane.
+// Whether something that marks boundary k in a texel is on the light's side of the receiver's plane.
 bool is_blocked(Fan fan, ivec2 texel, int k) {
+    bool blocked = is_clear(fan, texel, texel, k);
     vec2 texels = vec2(texel) + 0.5 - fan.start;
-    // All of the boundary's two buckets in front of the plane, everywhere in the texel?
-    float half_range = params.options.y != 0u ? 0.501 : 1.001;
-    float farthest = s_of(fan.places, float(k) + (fan.plane.z > 0.0 ? half_range : -half_range));
-    float reach = 0.5 * (abs(fan.plane.x) + abs(fan.plane.y));
-    bool blocked = in_front(fan, texels, farthest, reach);
-    if (!blocked) {
-        uvec2 head = texelFetch(heads, ivec3(texel, fan.layer / int(words_of(params.options))), 0).xy;
-        int bucket = 0;
-        for (uint i = 0u; i < head.y && bucket <= k && !blocked; ++i) {
-            float z = uintBitsToFloat(texelFetch(lists, list_place(head.x + i), 0).x);
-            float s = LIGHT_SHAPE == LIGHT_SUN ? -z : 1.0 / z;
-            bucket = bucket_of(params.options, place_of(fan.places, s));
-            bool near = bucket <= k && bucket >= (params.options.y != 0u ? k : k - 1);
-            blocked = near && in_front(fan, texels, s, 0.0);
-        }
+    uvec2 head = texelFetch(heads, ivec3(texel, fan.layer / int(words_of(params.options))), 0).xy;
+    int bucket = 0;
+    for (uint i = 0u; i < head.y && bucket <= k && !blocked; ++i) {
+        float z = uintBitsToFloat(texelFetch(lists, list_place(head.x + i), 0).x);
+        float s = LIGHT_SHAPE == LIGHT_SUN ? -z : 1.0 / z;
+        bucket = bucket_of(params.options, place_of(fan.places, s));
+        bool near = bucket <= k && bucket >= (params.options.y != 0u ? k : k - 1);
+        float height = dot(fan.plane, vec3(texels, s - fan.s));
+        blocked = near && height > fan.rounding.x + fan.rounding.y * abs(s);
     }
     return blocked;
 }
@@ -195,109 +191,128 @@ float boundary_s(Fan fan, int k) {
     return max(s_of(fan.places, float(k)), fan.s);
 }
 
-// Boundaries that rays may be blocked at: a bit each.
-uvec4 reached(Fan fan) {
+// Texels that rays look up between two boundaries: x, y of the first, x, y of the last.
+ivec4 texels_between(Fan fan, int first, int last) {
+    float near = boundary_s(fan, first) - fan.s;
+    float far = boundary_s(fan, last) - fan.s;
+    vec2 aside = (abs(fan.spread[0]) + abs(fan.spread[1])) * (1.0 + fan.growth * near);
+    aside += (params.options.w & DITHERED_TEXELS) != 0u ? 0.5 : 0.0;
+    vec2 low = fan.start + min(fan.low * near, fan.low * far) - aside;
+    vec2 high = fan.start + max(fan.high * near, fan.high * far) + aside;
+    return ivec4(clamp(floor(vec4(low, high)), 0.0, float(params.counts.y) - 1.0));
+}
+
+int highest(uvec4 bits) {
+    int word = bits.w != 0u ? 3 : bits.z != 0u ? 2 : bits.y != 0u ? 1 : 0;
+    return 32 * word + findMSB(bits[word]);
+}
+
+// Boundaries that rays may be blocked at, a bit each; in `clear` those of them where whatever marks
+// them is on the light's side of the receiver's plane.
+uvec4 reached(Fan fan, out uvec4 clear) {
     uvec4 found = uvec4(0u);
-    float size = float(params.counts.y);
+    clear = uvec4(0u);
     int k = fan.own;
     int count = 32;
     while (k >= 0) {
-        int first = max(k - count + 1, k & ~31);
-        float near = boundary_s(fan, first) - fan.s;
-        float far = boundary_s(fan, k) - fan.s;
-        vec2 spread = abs(fan.spread[0]) + abs(fan.spread[1]);
-        spread *= 1.0 + fan.growth * near;
-        vec2 low = fan.start + min(fan.low * near, fan.low * far) - spread;
-        vec2 high = fan.start + max(fan.high * near, fan.high * far) + spread;
-        ivec2 from = ivec2(clamp(floor(low), 0.0, size - 1.0));
-        ivec2 to = ivec2(clamp(floor(high), 0.0, size - 1.0));
-        ivec2 span = to - from;
-        int level = findMSB(max(span.x, span.y)) + 1;
-        ivec2 a = from >> level;
-        ivec2 b = to >> level;
-        int layer = fan.layer + (k >> 5);
-        uint bits = texelFetch(boundaries, ivec3(a, layer), level).x
-            | texelFetch(boundaries, ivec3(b, layer), level).x
-            | texelFetch(boundaries, ivec3(b.x, a.y, layer), level).x
-            | texelFetch(boundaries, ivec3(a.x, b.y, layer), level).x;
+        int word = k >> 5;
+        int first = max(k - count + 1, 32 * word);
+        ivec4 texels = texels_between(fan, first, k);
+        int level = findMSB(max(texels.z - texels.x, texels.w - texels.y)) + 1;
+        ivec4 cells = texels >> level;
+        int layer = fan.layer + word;
+        uint bits = texelFetch(boundaries, ivec3(cells.xy, layer), level).x
+            | texelFetch(boundaries, ivec3(cells.zw, layer), level).x
+            | texelFetch(boundaries, ivec3(cells.zy, layer), level).x
+            | texelFetch(boundaries, ivec3(cells.xw, layer), level).x;
         bits &= (0xFFFFFFFFu << (first & 31)) & (0xFFFFFFFFu >> (31 - (k & 31)));
         if (bits == 0u) {
             k = first - 1;
             count = min(2 * count, 32);
         } else if (first < k) {
-            k = (k & ~31) + findMSB(bits);
+            k = 32 * word + findMSB(bits);
             count = max(count >> 1, 1);
         } else {
-            // Few texels, as around the receiver: its own surface need not keep any ray.
-            bool blocked = max(span.x, span.y) >= MOST_ALIKE;
-            ivec2 texel = from;
-            while (!blocked && texel.y <= to.y) {
-                uint here = texelFetch(boundaries, ivec3(texel, layer), 0).x;
-                blocked = (here & bits) != 0u && is_blocked(fan, texel, k);
-                texel = texel.x < to.x ? texel + ivec2(1, 0) : ivec2(from.x, texel.y + 1);
-            }
-            found[k >> 5] |= blocked ? bits : 0u;
+            found[word] |= bits;
+            clear[word] |= is_clear(fan, texels.xy, texels.zw, k) ? bits : 0u;
             --k;
         }
     }
     return found;
 }
 
-// Those of the open rays that pass all marked boundaries of a word.
-uint passing(Fan fan, uint first_ray, uint open, int word, uint marks) {
+// Those of some boundaries that are not shown to be free for all rays at once: a few texels around the
+// receiver need not keep any ray from its own surface.
+uvec4 not_free(Fan fan, uvec4 marks) {
+    uvec4 left = uvec4(0u);
+    while (marks != uvec4(0u)) {
+        int k = highest(marks);
+        uint bit = 1u << (k & 31);
+        marks[k >> 5] ^= bit;
+        ivec4 texels = texels_between(fan, k, k);
+        bool blocked = max(texels.z - texels.x, texels.w - texels.y) >= MOST_ALIKE;
+        ivec2 texel = texels.xy;
+        while (!blocked && texel.y <= texels.w) {
+            uint here = texelFetch(boundaries, ivec3(texel, fan.layer + (k >> 5)), 0).x;
+            blocked = (here & bit) != 0u && is_blocked(fan, texel, k);
+            texel = texel.x < texels.z ? texel + ivec2(1, 0) : ivec2(texels.x, texel.y + 1);
+        }
+        left[k >> 5] |= blocked ? bit : 0u;
+    }
+    return left;
+}
+
+// Whether a ray passes all boundaries. level: of the cells of the pyramid to begin with; where a ray
+// ended is a fair guess for the next one.
+bool passes(Fan fan, uint index, vec2 place, vec4 course, uvec4 left, uvec4 clear, inout int level) {
     float size = float(params.counts.y);
     int top = textureQueryLevels(boundaries) - 1;
-    uint waiting = open;
-    uint left = 0u; // boundaries that the ray has to pass yet
-    int ray = 0;
-    int level = 0;
-    vec2 start = vec2(0.0);
-    vec2 slope = vec2(0.0);
-    while (left != 0u || waiting != 0u) {
-        if (left == 0u) {
-            ray = findLSB(waiting);
-            waiting &= waiting - 1u;
-            vec2 place = ray_of(fan, first_ray + uint(ray)).xy;
-            vec4 course = fan.middle + place.x * fan.along_x + place.y * fan.along_y;
-            float place_z = 1.0 / fan.s - course.z;
-            vec2 aside = fan.spread * place;
-            start = fan.start + aside;
-            aside *= LIGHT_SHAPE == LIGHT_SUN ? 0.0 : place_z / fan.s;
-            slope = (course.xy - aside) / course.z;
-            slope = mix(slope, vec2(1.0e-30), lessThan(abs(slope), vec2(1.0e-30)));
-            level = FIRST_LEVEL;
-            // A light may reach among the boundaries: those behind its place cannot hide it.
-            float end = LIGHT_SHAPE != LIGHT_SUN && place_z > 0.0 ? place_of(fan.places, 1.0 / place_z) + 1.0 : 0.0;
-            int least = int(clamp(end - float(32 * word), 0.0, 32.0));
-            left = course.z > 0.0 && least < 32 ? marks & (0xFFFFFFFFu << least) : 0u;
-        }
-        if (left != 0u) {
-            int bit = findMSB(left);
-            float s = boundary_s(fan, 32 * word + bit);
+    float place_z = 1.0 / fan.s - course.z;
+    vec2 aside = fan.spread * place;
+    vec2 start = fan.start + aside;
+    aside *= LIGHT_SHAPE == LIGHT_SUN ? 0.0 : place_z / fan.s;
+    vec2 slope = (course.xy - aside) / course.z;
+    vec2 across = 1.0 / mix(slope, vec2(1.0e-30), lessThan(abs(slope), vec2(1.0e-30)));
+    if ((params.options.w & DITHERED_TEXELS) != 0u) {
+        // The additive recurrence of the plastic number (Roberts 2018).
+        start += fract(vec2(0.75487766, 0.56984029) * float(index) + 0.5) - 0.5;
+    }
+    // A light may reach among the boundaries: those behind its place cannot hide it.
+    bool among = LIGHT_SHAPE != LIGHT_SUN && place_z > 0.0;
+    float end = among ? floor(place_of(fan.places, 1.0 / place_z)) + 1.0 : 0.0;
+    int least = int(clamp(end, 0.0, 128.0));
+    bool open = true;
+    bool found = course.z > 0.0;
+    while (found) {
+        // Search for a mark on the ray's way.
+        found = false;
+        ivec2 cell = ivec2(0);
+        int k = highest(left);
+        while (!found && left != uvec4(0u) && k >= least) {
+            float s = boundary_s(fan, k);
             vec2 at = floor(start + slope * (s - fan.s));
-            if (any(notEqual(at, clamp(at, 0.0, size - 1.0)))) {
-                left = 0u;
-            } else {
-                ivec2 cell = ivec2(at) >> level;
-                vec2 edge = vec2((cell + ivec2(greaterThan(slope, vec2(0.0)))) << level);
-                vec2 leaves = (edge - start) / slope;
-                float last = ceil(place_of(fan.places, fan.s + min(leaves.x, leaves.y)));
-                int least = int(clamp(last - float(32 * word), 0.0, float(bit)));
-                uint crossed = left & (0xFFFFFFFFu << least);
-                ivec3 place = ivec3(cell, fan.layer + word);
-                uint hit = crossed & texelFetch(boundaries, place, level).x;
-                left ^= crossed ^ hit;
-                if (hit == 0u) {
-                    level = min(level + 1, top);
-                } else if (level > 0) {
-                    level -= 1;
-                } else {
-                    bit = findMSB(hit);
-                    bool blocked = is_blocked(fan, cell, 32 * word + bit);
-                    open ^= blocked ? 1u << ray : 0u;
-                    left = blocked ? 0u : left ^ (1u << bit);
-                }
-            }
+            bool inside = all(equal(at, clamp(at, 0.0, size - 1.0)));
+            cell = ivec2(at) >> level;
+            vec2 edge = vec2((cell + ivec2(greaterThan(across, vec2(0.0)))) << level);
+            vec2 leaves = (edge - start) * across;
+            float last = ceil(place_of(fan.places, fan.s + min(leaves.x, leaves.y)));
+            int word = k >> 5;
+            int lowest = int(clamp(last - float(32 * word), 0.0, float(k & 31)));
+            uint bits = left[word];
+            uint crossed = bits & (0xFFFFFFFFu << lowest);
+            ivec3 texel = ivec3(inside ? cell : ivec2(0), fan.layer + word);
+            uint hit = crossed & texelFetch(boundaries, texel, level).x;
+            found = inside && hit != 0u && level == 0;
+            level = hit == 0u ? min(level + 1, top) : max(level - 2, 0);
+            left[word] = bits ^ crossed ^ hit;
+            left = inside ? left : uvec4(0u);
+            k = highest(left);
+        }
+        if (found) {
+            uint bit = 1u << (k & 31);
+            open = (clear[k >> 5] & bit) == 0u && !is_blocked(fan, cell, k);
+            left[k >> 5] ^= bit;
+            found = open;
         }
     }
     return open;
@@ -305,28 +320,21 @@ uint passing(Fan fan, uint first_ray, uint open, int word, uint marks) {
 
 // The part of the light that is seen, of that above the receiver's plane.
 float traced(Fan fan) {
-    uvec4 marks = reached(fan);
+    uvec4 clear;
+    uvec4 marks = reached(fan, clear);
+    marks = (marks & clear) | not_free(fan, marks & ~clear);
     if (marks == uvec4(0u)) {
         return 1.0;
     }
     float seen = 0.0;
     float above = 0.0;
-    uint count = params.options.z;
-    for (uint first = 0u; first < count; first += 32u) {
-        uint open = 0u;
-        for (uint i = first; i < min(first + 32u, count); ++i) {
-            vec3 ray = ray_of(fan, i);
-            bool over = fan.middle.w + ray.x * fan.along_x.w + ray.y * fan.along_y.w > 0.0;
-            open |= over ? 1u << (i - first) : 0u;
-            above += over ? ray.z : 0.0;
-        }
-        for (int word = fan.own >> 5; word >= 0; --word) {
-            open = passing(fan, first, open, word, marks[word]);
-        }
-        while (open != 0u) {
-            int i = findLSB(open);
-            open &= open - 1u;
-            seen += rays[first + uint(i)].z;
+    int level = 0;
+    for (uint i = 0u; i < params.options.z; ++i) {
+        vec3 ray = ray_of(fan, i);
+        vec4 course = fan.middle + ray.x * fan.along_x + ray.y * fan.along_y;
+        if (course.w > 0.0) {
+            above += ray.z;
+            seen += passes(fan, i, ray.xy, course, marks, clear, level) ? ray.z : 0.0;
         }
     }
     return above > 0.0 ? min(seen / above, 1.0) : 1.0;

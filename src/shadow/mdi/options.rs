@@ -41,6 +41,9 @@ pub struct MdiOptions {
     pub random: bool,
     /// Where rays begin.
     pub footprint: Footprint,
+    /// Rays look up texels up to half a texel aside, each otherwise: the steps of slanted edges
+    /// average out.
+    pub dithered: bool,
     /// Depths that the lists have room for, per texel of all views on average, 1 to 64.
     pub depths: u32,
 }
@@ -49,12 +52,13 @@ impl MdiOptions {
     /// What the technique does without options.
     pub const DEFAULT: Self = Self {
         resolution: None,
-        buckets: 128,
+        buckets: 64,
         spacing: Buckets::Reciprocal,
         nearest: true,
         rays: 64,
         random: false,
         footprint: Footprint::Point,
+        dithered: true,
         depths: 8,
     };
 
@@ -66,7 +70,7 @@ impl MdiOptions {
             "64 to 2048, a power of two, or auto (4 times the picture's longer side, 256 to 1024)",
             "texels across and down each view's image",
         ),
-        option("buckets", "128", "32, 64 or 128", "depth buckets"),
+        option("buckets", "64", "32, 64 or 128", "depth buckets"),
         option(
             "spacing",
             "reciprocal",
@@ -91,6 +95,12 @@ impl MdiOptions {
             "point",
             "point or pixel (over what the pixel shows, antialiased)",
             "places of the surface that rays begin at",
+        ),
+        option(
+            "lookup",
+            "dithered",
+            "dithered (up to half a texel aside, other for each ray) or nearest",
+            "texels that rays look up",
         ),
         option(
             "depths",
@@ -119,6 +129,7 @@ impl MdiOptions {
                 Footprint::Pixel => "pixel",
             }
             .to_string(),
+            if self.dithered { "dithered" } else { "nearest" }.to_string(),
             self.depths.to_string(),
         ]
     }
@@ -153,6 +164,13 @@ impl MdiOptions {
                 self.random = match value {
                     "fan" => false,
                     "random" => true,
+                    _ => return None,
+                }
+            }
+            "lookup" => {
+                self.dithered = match value {
+                    "dithered" => true,
+                    "nearest" => false,
                     _ => return None,
                 }
             }

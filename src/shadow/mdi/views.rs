@@ -81,7 +81,9 @@ pub(super) fn mdi_views(
             options.buckets,
             u32::from(options.nearest),
             options.rays,
-            u32::from(options.random) | u32::from(options.footprint == Footprint::Pixel) << 1,
+            u32::from(options.random)
+                | (u32::from(options.footprint == Footprint::Pixel) << 1)
+                | (u32::from(options.dithered) << 2),
         ],
         origin: origin.as_vec3().extend(0.0).to_array(),
         views: [LightView::default(); MAX_LIGHT_VIEWS],

@@ -51,6 +51,7 @@ struct End {
 const uint EDGE_NONE = 0u;
 const uint EDGE_TEXEL = 1u;
 const uint EDGE_EXACT = 2u;
+const uint EDGE_MISSED = 3u; // by texels: the triangle there does not reach the receiver's plane
 
 struct Edge {
     float place;
@@ -81,25 +82,42 @@ Edge triangle_edge(End end, Receiver receiver, uint triangle, bool first) {
         vec3 q = fetch_corner(triangle, i).position - end.position;
         corners[i] = vec3(dot(q, end.along), dot(q, outward), dot(q, side));
     }
-    float best = first ? 1.0e30 : -1.0e30;
-    bool any_crossing = false;
-    bool behind = false;
+    // The plane cuts the triangle between two points, p nearer to the light's axis.
+    vec2 p = vec2(0.0);
+    vec2 q = vec2(0.0);
+    uint cuts = 0u;
     for (uint i = 0u; i < 3u; ++i) {
         vec3 a = corners[i];
         vec3 b = corners[(i + 1u) % 3u];
         bool crosses = (a.z > 0.0) != (b.z > 0.0);
-        vec3 p = mix(a, b, crosses ? a.z / (a.z - b.z) : 0.0);
-        float fall = r_f - p.y;
-        bool in_front = fall > 1.0e-5 * r_f && p.y > 0.0;
-        float t = (p.x * r_f - x_f * p.y) / (max(fall, 1.0e-30) * end.length_m);
-        bool used = crosses && in_front;
-        best = used ? (first ? min(best, t) : max(best, t)) : best;
-        any_crossing = any_crossing || used;
-        behind = behind || (crosses && !in_front);
+        vec2 at = mix(a.xy, b.xy, crosses ? a.z / (a.z - b.z) : 0.0);
+        p = crosses && cuts == 0u ? at : p;
+        q = crosses ? at : q;
+        cuts += crosses ? 1u : 0u;
     }
-    // A triangle that goes on behind the receiver hides everything on one side.
-    best = behind && !first ? 1.0e30 : best;
-    return Edge(best, any_crossing ? EDGE_EXACT : EDGE_NONE);
+    if (cuts == 0u) {
+        return Edge(0.0, EDGE_MISSED);
+    }
+    vec2 lower = p.y < q.y ? p : q;
+    vec2 upper = p.y < q.y ? q : p;
+    float deepest = r_f * (1.0 - 1.0e-5);
+    if (upper.y <= 0.0 || lower.y >= deepest) {
+        // Beyond the light, or behind the receiver: there it hides all that is farther along the light.
+        return Edge(1.0e30, first || upper.y <= 0.0 ? EDGE_NONE : EDGE_EXACT);
+    }
+    // Of what goes on beyond the light's axis, the part up to there counts.
+    lower = lower.y < 0.0 ? mix(lower, upper, lower.y / (lower.y - upper.y)) : lower;
+    float t = (lower.x * r_f - x_f * lower.y) / ((r_f - lower.y) * end.length_m);
+    float other = (upper.x * r_f - x_f * upper.y) / (max(r_f - upper.y, 1.0e-30) * end.length_m);
+    if (upper.y > deepest) {
+        // It goes on behind the receiver, and hides all of the light on one side.
+        float x = mix(lower.x, upper.x, (r_f - lower.y) / (upper.y - lower.y));
+        other = x > x_f ? 1.0e30 : -1.0e30;
+    }
+    if (first && max(t, other) < 0.0) {
+        return Edge(1.0, EDGE_NONE);
+    }
+    return Edge(first ? min(t, other) : max(t, other), EDGE_EXACT);
 }
 
 // Whether a triangle is too narrow for the map, or cut by alpha: its texels say more than its corners.
@@ -146,11 +164,15 @@ float texel_place(End end, Row row, int column, float half_texel) {
 
 // Where what a texel shows begins to hide the segment (first), or ends to.
 Edge edge_at(End end, Receiver receiver, Row row, int column, bool first, float texel_m) {
+    bool missed = false;
     if (EXACT_EDGES != 0u) {
         uint id = fetch_map_id(ivec2(column, row.index), end.layer);
         if (id != 0u && !is_fine(end, receiver, id - 1u, texel_m)) {
             Edge exact = triangle_edge(end, receiver, id - 1u, first);
-            return Edge(clamp(exact.place, 0.0, 1.0), exact.kind);
+            missed = exact.kind == EDGE_MISSED;
+            if (!missed) {
+                return Edge(clamp(exact.place, 0.0, 1.0), exact.kind);
+            }
         }
     }
     // A surface ends between its last texel and the next. A flat one goes on to there as it is. A round
@@ -168,7 +190,7 @@ Edge edge_at(End end, Receiver receiver, Row row, int column, bool first, float 
         place = (t * rise - 0.5) / max(rise - 0.5 * bend / t, 1.0e-30);
         place = min(place, t);
     }
-    return Edge(clamp(place, 0.0, 1.0), EDGE_TEXEL);
+    return Edge(clamp(place, 0.0, 1.0), missed ? EDGE_MISSED : EDGE_TEXEL);
 }
 
 // What hides the segment first, in one row.
@@ -203,8 +225,13 @@ Blocker row_blocker(End end, Receiver receiver, Row row, uvec2 starts, float tex
 }
 
 // Two rows' edges as one. Exact ones are of the receiver's own plane; others are of the rows' planes,
-// between which the receiver lies.
+// between which the receiver lies. Where one row's triangle ends before the receiver's plane and the other
+// row has nothing, so does the receiver's; if both do, it is another triangle that lies between them.
 float joined(Edge above, Edge below, float part, bool first) {
+    if (first && (above.kind == EDGE_NONE || below.kind == EDGE_NONE)) {
+        above.place = above.kind == EDGE_MISSED ? 1.0 : above.place;
+        below.place = below.kind == EDGE_MISSED ? 1.0 : below.place;
+    }
     bool exact_above = above.kind == EDGE_EXACT;
     bool exact_below = below.kind == EDGE_EXACT;
     float a = exact_above == exact_below || exact_above ? above.place : below.place;
@@ -239,8 +266,7 @@ Edge row_border(End end, Receiver receiver, Row row, uvec2 starts, ivec2 columns
         return NOWHERE;
     }
     Edge border = edge_at(end, receiver, row, int(near ? starts.x : starts.y) - 1, false, texel_m);
-    // The surface goes on to behind the receiver.
-    return border.kind == EDGE_NONE ? Edge(1.0, EDGE_TEXEL) : border;
+    return border;
 }
 
 // Where light can begin beyond what hides an end; 1 if nowhere.

@@ -74,18 +74,16 @@ pub(super) fn line_views(
             .collect();
         let far = seen.iter().map(|v| v.length()).fold(0.0, f64::max);
         let near = (far * 1.0e-6).max(f64::from(f32::MIN_POSITIVE) * 1.0e6);
-        let seen: Vec<DVec3> = seen.into_iter().filter(|v| v.z > near).collect();
-        if seen.is_empty() {
+        if seen.iter().all(|v| v.z <= near) {
             continue;
         }
+        // A hull may reach to the line's own axis, where rounding decides the sign of depths: what is
+        // so near is as steep as it gets.
+        let steepness =
+            |v: &DVec3, across: f64| (across / v.z.max(near)).clamp(-STEEPEST, STEEPEST);
         let blocker = nearest_depth(casters, &local, far).max(NEAREST_BLOCKER * length);
         // From the line's point at a distance along it, metres.
-        let extent = |along: f64| {
-            let tangents = seen
-                .iter()
-                .map(|v| ((v.x - along) / v.z).clamp(-STEEPEST, STEEPEST));
-            range(tangents)
-        };
+        let extent = |along: f64| range(seen.iter().map(|v| steepness(v, v.x - along)));
         let ends: Vec<(f64, f64)> = (0..points)
             .map(|point| {
                 let (low, high) = extent(length * point as f64 / (points - 1) as f64);
@@ -101,7 +99,7 @@ pub(super) fn line_views(
             })
             .collect();
         let widest = ends.iter().map(|(a, b)| b - a).fold(1.0e-6, f64::max);
-        let (low_y, high_y) = range(seen.iter().map(|v| (v.y / v.z).clamp(-STEEPEST, STEEPEST)));
+        let (low_y, high_y) = range(seen.iter().map(|v| steepness(v, v.y)));
         let height = (high_y - low_y).max(1.0e-3 * widest);
         for (point, (low, _)) in ends.into_iter().enumerate() {
             let low_x = low - MARGIN * widest;

@@ -1,15 +1,12 @@
 //! The same case in other guises, and a small step from where it was.
 
 use crate::compare::{Change, flipped, known};
-use crate::limits::{finished, judge, limits};
+use crate::limits::{MAY_FLIP, finished, judge, limits};
 use crate::rig::{PIXELS, Rig};
 use crate::support;
 use antumbra::shadow::Technique;
 use antumbra::stress::{Case, SCALES, Similarity, cases};
 use glam::{DQuat, DVec3, EulerRot, Vec3};
-
-/// Part of the pixels that rounding may decide anew.
-const MAY_FLIP: f64 = 0.0005;
 
 fn can_do(technique: Technique, case: &Case) -> bool {
     technique.check(case.area_light()).is_ok()
@@ -47,7 +44,7 @@ fn scaled_or_far_away() {
                 let after = rig.draw(guise, technique);
                 let change = Change::of(&before, &after, |i| here[i] && sure[i], 1.0e-3);
                 line += &format!(" {}/{:.2}", change.changed, change.most);
-                if change.part() > MAY_FLIP {
+                if change.part() > limits(technique).flips {
                     let title = format!("{}, {}", guise.name, technique.name());
                     faults.push(format!("{title}: {change:?}"));
                 }

@@ -20,7 +20,12 @@ pub struct Limits {
     pub jumps: f64,
     /// A change that counts as a jump.
     pub jump: f32,
+    /// Part of pixels that rounding may decide anew under a uniform scale or far away.
+    pub flips: f64,
 }
+
+/// Part of the pixels that rounding may decide anew.
+pub const MAY_FLIP: f64 = 0.0005;
 
 pub fn limits(technique: Technique) -> Limits {
     match technique.name() {
@@ -35,6 +40,7 @@ pub fn limits(technique: Technique) -> Limits {
             brighter: 0.0005,
             jumps: 0.002,
             jump: 0.5,
+            flips: MAY_FLIP,
         },
         // The filter reaches 2.5 texels whatever the light: shadows narrower than that blur away. Its
         // taps fall on other texels once the map is fitted anew (boxes lie along the axes, so a turn
@@ -50,6 +56,7 @@ pub fn limits(technique: Technique) -> Limits {
             brighter: 0.0,
             jumps: 0.005,
             jump: 0.25,
+            flips: MAY_FLIP,
         },
         // As pcf where the filter is narrow. The area searched for blockers follows boxes along the
         // axes, so a turn changes what is found: a fault of the method, measured as 0.35 and, of the
@@ -66,6 +73,22 @@ pub fn limits(technique: Technique) -> Limits {
             brighter: 0.06,
             jumps: 0.005,
             jump: 0.25,
+            flips: MAY_FLIP,
+        },
+        // Edges lie where triangles end, whatever the map, but which triangles a receiver looks at is a
+        // matter of texels: of blockers smaller than some texels, as where a box stands on a wide floor,
+        // another part is found once the map is fitted anew (0.12 measured). In the cage nearly all
+        // pixels are partly lit by way of dozens of holes; two of 3058 find another edge by rounding, 0.012 off.
+        "oess" => Limits {
+            step: 0.05,
+            fine: 0.005,
+            own_walls: 0.0,
+            turned: 0.2,
+            turned_mean: 0.002,
+            brighter: 0.0,
+            jumps: 0.005,
+            jump: 0.25,
+            flips: 0.001,
         },
         // Measured at these pictures' 512 texels: boxes that turn with the scene fit nearly the same
         // views, and the rest is where texels and slices fall on edges. Beside the walls of a room the
@@ -79,6 +102,7 @@ pub fn limits(technique: Technique) -> Limits {
             brighter: 0.0005,
             jumps: 0.001,
             jump: 0.25,
+            flips: MAY_FLIP,
         },
         other => panic!("state the limits of technique `{other}` in {}", file!()),
     }
@@ -94,7 +118,7 @@ pub fn leak(technique: Technique) -> f32 {
 }
 
 /// Techniques that are not finished, and not tested here before they are.
-const IN_WORK: [&str; 5] = ["ssoc", "oess", "mdi", "dbuffer", "shaft-masks"];
+const IN_WORK: [&str; 4] = ["ssoc", "mdi", "dbuffer", "shaft-masks"];
 
 /// All techniques that must hold.
 pub fn finished() -> impl Iterator<Item = Technique> {

@@ -91,11 +91,11 @@ impl Lists {
     /// done.
     pub(super) fn add(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> (Found, ImageId) {
         let mut boxes: Vec<ImageId> = Vec::new();
-        for level in 0..GROUPS.len() {
+        for (level, group) in GROUPS.into_iter().enumerate() {
             let below = level
                 .checked_sub(1)
                 .map(|below| (boxes[below], GROUPS[below]));
-            boxes.push(self.add_boxes(graph, inputs, GROUPS[level], below));
+            boxes.push(self.add_boxes(graph, inputs, group, below));
         }
         let mut made = self.add_lists(graph, inputs, [boxes[0], boxes[1], boxes[2]]);
         if inputs.scene.has_masks() {

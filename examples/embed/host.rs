@@ -163,7 +163,8 @@ impl Host {
 
     pub fn wait_idle(&self) -> Outcome<()> {
         // SAFETY: the device is alive.
-        Ok(unsafe { self.device.device_wait_idle()? })
+        unsafe { self.device.device_wait_idle()? };
+        Ok(())
     }
 
     pub fn allocate(

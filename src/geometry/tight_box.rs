@@ -131,7 +131,7 @@ mod tests {
             (state >> 8) as f32 / (1 << 23) as f32 - 1.0
         };
         for _ in 0..200 {
-            let far = 1.0e3 * Vec3::new(random(), random(), random());
+            let far = Vec3::new(random(), random(), random());
             let point = |random: &mut dyn FnMut() -> f32| {
                 far + Vec3::new(random(), 0.01 * random(), 3.0 * random())
             };

@@ -12,7 +12,7 @@ pub(super) fn texels(count: u32, is_rect: bool) -> [[f32; 4]; MOST_TEXELS] {
     let mut texels = [[0.0; 4]; MOST_TEXELS];
     for i in 0..count as usize {
         let [u, v] = if is_rect {
-            on_square(i)
+            on_square(i, count)
         } else {
             on_disk(i, count)
         };
@@ -29,10 +29,12 @@ fn on_disk(i: usize, count: u32) -> [f64; 2] {
     [radius * cosine, radius * sine]
 }
 
-/// Multiples of powers of the plastic number (Roberts 2018, the sequence R2).
-fn on_square(i: usize) -> [f64; 2] {
-    const PLASTIC: f64 = 1.324_717_957_244_746;
-    [PLASTIC, PLASTIC * PLASTIC].map(|p| 2.0 * (0.5 + (i as f64 + 1.0) / p).fract() - 1.0)
+/// A lattice turned by the golden ratio: even along the first axis, and nearly so along the second.
+fn on_square(i: usize, count: u32) -> [f64; 2] {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let first = (i as f64 + 0.5) / f64::from(count);
+    let second = (i as f64 * GOLDEN + 0.3).fract();
+    [2.0 * first - 1.0, 2.0 * second - 1.0]
 }
 
 #[cfg(test)]

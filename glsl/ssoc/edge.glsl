@@ -156,7 +156,11 @@ Seen look_at(Place here, LightView light_view, uint entry, vec2 from_place) {
     found.delta = dot(from_place - found.nearest, found.outward);
     found.width = penumbra_half_width(params.reach.x, perspective, found.depth, here.depth, found.nearest);
     float apart = perspective ? found.depth - here.depth : here.depth - found.depth;
-    if (apart <= 1.0e-5 * abs(here.depth) || !over_receiver(here, first, second)) {
+    // Farther away than its penumbra reaches, the line of an edge says nothing, for it may have ended
+    // on the way.
+    if (apart <= 1.0e-5 * abs(here.depth)
+        || distance(from_place, found.nearest) > found.width
+        || !over_receiver(here, first, second)) {
         return found;
     }
     found.number = number;

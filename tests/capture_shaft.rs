@@ -146,20 +146,15 @@ fn check(renderer: &mut FrameRenderer<'static>, name: &str, side: u32) {
 /// Most bits that may differ: samples within rounding of an edge.
 const MOST: f64 = 1.0e-4;
 
-const SCENES: [&str; 13] = [
-    "blockers.gltf",
+/// All shapes of lights; meshes that are closed, open, mirrored, fine, far away or have holes.
+const SCENES: [&str; 7] = [
     "comb.gltf",
     "far_away.gltf",
     "fences.gltf",
     "figure.glb",
     "foliage.glb",
     "lights.gltf",
-    "mirrored.gltf",
-    "poles.gltf",
     "room.glb",
-    "sphere_over_plane.gltf",
-    "sun_court.glb",
-    "tube.gltf",
 ];
 
 #[test]
@@ -169,7 +164,7 @@ fn masks_are_those_of_rays() {
     for name in SCENES {
         check(&mut renderer, name, 8);
     }
-    check(&mut renderer, "sphere_over_plane.gltf", 16);
+    check(&mut renderer, "mirrored.gltf", 16);
     check(&mut renderer, "sphere_over_plane.gltf", 32);
     support::assert_no_messages(&renderer.destroy().unwrap());
 }
@@ -192,10 +187,78 @@ fn lists_without_room_change_nothing() {
         "shaft-masks:samples=64",
         "shaft-masks:samples=64,room=0",
         "shaft-masks:samples=64,room=4",
-        "shaft-masks:samples=64",
     ];
     same("figure.glb", &techniques);
     // Tens of thousands of triangles in a shaft, cut out by their texture.
     same("foliage.glb", &techniques[..2]);
+    support::assert_no_messages(&renderer.destroy().unwrap());
+}
+
+/// Visibility of one light and the bound on its error.
+fn bounded(
+    renderer: &mut FrameRenderer<'static>,
+    camera: &SceneCamera,
+    light: usize,
+    technique: &str,
+) -> (Vec<f32>, Vec<f32>) {
+    let request = FrameRequest {
+        camera: camera.clone(),
+        size: SIZE,
+        lights: vec![light],
+        technique: technique.parse().unwrap(),
+    };
+    let frame = renderer
+        .render_with_images(&request, &["visibility_bound"])
+        .unwrap();
+    let Samples::Float(bound) = &frame.images[0].planes[0] else {
+        panic!("{:?}", frame.images[0].planes);
+    };
+    (frame.lights[0].visibility.clone(), bound.clone())
+}
+
+/// 64 samples are off by what they say at most, told by 1024, which are rays' and off by a hundredth;
+/// and where nothing is undecided they are not off at all.
+#[test]
+fn errors_are_within_their_bounds() {
+    let _one = support::serial();
+    let scene = load("lights.gltf");
+    let camera = scene.select_camera(None).unwrap();
+    let mut renderer = FrameRenderer::owning(support::gpu(), scene.clone()).unwrap();
+    // A disk, a rectangle, a sphere, a line and a sun.
+    for light in 0..5 {
+        let name = &scene.lights[light].name;
+        let (few, bound) = bounded(&mut renderer, &camera, light, "shaft-masks:samples=64");
+        let (many, finer) = bounded(&mut renderer, &camera, light, "shaft-masks:samples=1024");
+        let (mut penumbra, mut sums, mut worst) = (0, [0.0; 2], 0.0f32);
+        for i in 0..few.len() {
+            let off = (few[i] - many[i]).abs();
+            worst = worst.max(off);
+            if bound[i] == 0.0 {
+                assert_eq!(few[i], many[i], "{name}, pixel {i}: all is decided");
+                assert!(few[i] == 0.0 || few[i] == 1.0, "{name}, pixel {i}");
+            }
+            assert!(
+                off <= bound[i] + 0.01,
+                "{name}, pixel {i}: {off}, {}",
+                bound[i]
+            );
+            if (0.005..0.995).contains(&many[i]) {
+                penumbra += 1;
+                sums[0] += bound[i];
+                sums[1] += finer[i];
+            }
+        }
+        let [coarse, fine] = sums.map(|sum| sum / penumbra as f32);
+        println!("{name}: bounds {coarse:.3} and {fine:.3} over {penumbra} pixels, off {worst:.3}");
+        assert!(
+            penumbra > 20 && worst > 0.0,
+            "{name}: there is something to measure"
+        );
+        // Cells that a straight edge crosses are 8 to 15 of 64, and 32 to 63 of 1024.
+        assert!(
+            coarse < 0.5 && fine < 0.6 * coarse,
+            "{name}: {coarse}, {fine}"
+        );
+    }
     support::assert_no_messages(&renderer.destroy().unwrap());
 }

@@ -51,6 +51,11 @@ layout(set = 0, binding = 17, std430) buffer PartialArguments {
     TileArguments partial;
 };
 layout(set = 0, binding = 18, r32ui) uniform writeonly uimage2D partial_list;
+// Those whose masks are made in pieces.
+layout(set = 0, binding = 19, std430) buffer PiecesArguments {
+    TileArguments pieces;
+};
+layout(set = 0, binding = 20, r32ui) uniform writeonly uimage2D pieces_list;
 
 // Pairs of corners that an invocation looks at to find a dark tile.
 const uint MOST_LOOKS = 256u;
@@ -194,9 +199,10 @@ void main() {
     uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
     uint lane = gl_LocalInvocationIndex;
     uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
-    uvec2 tile = tile_of_entry(entry, tiles);
+    uvec2 part = part_of_entry(entry, tiles);
+    uvec2 tile = tile_of_part(part, tiles);
     // Only this workgroup writes them, and no texel that another invocation reads.
-    uvec4 candidates = imageLoad(lists, list_place(tile));
+    uvec4 candidates = imageLoad(lists, list_place(part));
     if (lane == 0u) {
         edge_count = 0u;
         count_sum = 0u;
@@ -210,8 +216,8 @@ void main() {
     ivec2 place = ivec2(tile.x * TILE_TEXELS, tile.y);
     TileBounds bounds = tile_bounds_of(texelFetch(tile_bounds, place, 0),
         texelFetch(tile_bounds, place + ivec2(1, 0), 0), texelFetch(tile_bounds, place + ivec2(2, 0), 0));
-    Shaft shaft = fetch_shaft(tile);
-    Surfaces surfaces = fetch_surfaces(tile, view.light);
+    Shaft shaft = fetch_shaft(part);
+    Surfaces surfaces = fetch_surfaces(part, view.light);
     mat3 frame = light_frame(view.light, tile_corner(view.camera, tile, bounds, 0u));
     uint last = first_triangle + candidates.y - 1u;
     uint looks = 0u;
@@ -225,12 +231,14 @@ void main() {
                 if (covers(tile, bounds, frame, t, looks)) {
                     is_dark = 1u;
                 }
+                bool hides = !is_below(surfaces, t.corners[0], t.corners[1], t.corners[2])
+                    && !is_beyond_light(surfaces, t.corners[0], t.corners[1], t.corners[2]);
                 if (side != SIDE_UNSURE) {
                     add_edges(shaft, surfaces, triangle, t, side);
-                } else if (is_whole(surfaces, t)) {
+                } else if (hides && is_whole(surfaces, t)) {
                     uint at = first_triangle + atomicAdd(whole_count, 1u);
                     imageStore(triangle_pool, triangle_texel_place(at), uvec4(triangle));
-                } else {
+                } else if (hides) {
                     uint at = last - atomicAdd(other_count, 1u);
                     imageStore(triangle_pool, triangle_texel_place(at), uvec4(triangle));
                 }
@@ -254,12 +262,15 @@ void main() {
     uint others = fits ? other_count : 0u;
     uint resume = fits ? candidates.z : 0u;
     bool dark = is_dark != 0u;
+    vec2 depths = fetch_part_depths(part);
     bool partly = resume < params.counts.z && !dark;
     for (uint i = lane; i < TILE_SIZE * TILE_SIZE && dark; i += gl_WorkGroupSize.x) {
         // Stores beyond the picture's border are dropped.
         uvec2 pixel = tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);
-        bool hit = shaft.high.w > 0.0 || texelFetch(view_depth, ivec2(min(pixel, size - 1u)), 0).x > 0.0;
-        imageStore(visibility, ivec2(pixel), vec4(hit ? 0.0 : 1.0));
+        float depth = texelFetch(view_depth, ivec2(min(pixel, size - 1u)), 0).x;
+        if (is_in_part(depths, depth)) {
+            imageStore(visibility, ivec2(pixel), vec4(depth > 0.0 ? 0.0 : 1.0));
+        }
     }
     for (uint i = (lane + 1u) * TASK_ENTRIES; i < whole + others && !dark; i += gl_WorkGroupSize.x * TASK_ENTRIES) {
         uint task = atomicAdd(further.count, 1u);
@@ -268,10 +279,16 @@ void main() {
         imageStore(tasks, task_place(task), uvec4(entry, i, 0u, 0u));
     }
     if (lane == 0u) {
-        ivec2 at = list_place(tile);
+        ivec2 at = list_place(part);
         imageStore(lists, at, uvec4(candidates.xy, resume, dark ? TILE_SETTLED : TILE_OPEN));
         imageStore(lists, at + ivec2(1, 0), uvec4(first_edge, fits ? edges : 0u, first_triangle, candidates.y));
         imageStore(lists, at + ivec2(2, 0), uvec4(whole, others, 0u, 0u));
+        if (!dark && (params.pattern.y > 1u || whole + others > TASK_ENTRIES || partly)) {
+            uint slot = atomicAdd(pieces.count, 1u);
+            atomicMax(pieces.groups_x, min(slot + 1u, TILE_ROW));
+            atomicMax(pieces.groups_y, slot / TILE_ROW + 1u);
+            imageStore(pieces_list, tile_entry_place(slot, tiles), uvec4(entry));
+        }
         if (partly) {
             uint slot = atomicAdd(partial.count, 1u);
             atomicMax(partial.groups_x, min(slot + 1u, TILE_ROW));

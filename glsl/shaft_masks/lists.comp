@@ -1,5 +1,5 @@
 #version 460
-// Walks the hierarchy with each tile's shaft. A tile whose shaft meets no triangle is lit and settled
+// Walks the hierarchy with the shaft of each tile, or part of one. A tile whose shaft meets no triangle is lit and settled
 // here. The others get a list of candidates: the triangles whose boxes the shaft meets, but for those
 // that lie in it together with their neighbours and show one side to all of the tile, whose edges all
 // cancel.
@@ -33,6 +33,7 @@ layout(set = 0, binding = 8, std430) buffer Pool {
 layout(set = 0, binding = 9, r32ui) uniform writeonly uimage2D pool;
 layout(set = 0, binding = 10, rgba32ui) uniform writeonly uimage2D lists;
 layout(set = 0, binding = 11, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 12) uniform sampler2D view_depth;
 
 // A software driver may end loops after 65,535 turns of all lanes of a vector together: a walk ends
 // itself before, and the passes on lists take it up where it ended.
@@ -67,9 +68,9 @@ void main() {
     uvec2 size = params.counts.xy;
     uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
     uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
-    uvec2 tile = tile_of_entry(entry, tiles);
-    Shaft shaft = fetch_shaft(tile);
-    Surfaces surfaces = fetch_surfaces(tile, view.light);
+    uvec2 part = part_of_entry(entry, tiles);
+    Shaft shaft = fetch_shaft(part);
+    Surfaces surfaces = fetch_surfaces(part, view.light);
 
     uint nodes = params.counts.z;
     uint first = 0u;
@@ -119,18 +120,22 @@ void main() {
         }
     }
 
+    vec2 depths = fetch_part_depths(part);
     bool lit = !any && resume == nodes && shaft.low.w > 0.0;
     if (lit) {
         for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
             // Stores beyond the picture's border are dropped.
-            uvec2 pixel = tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);
-            imageStore(visibility, ivec2(pixel), vec4(1.0));
+            uvec2 pixel = tile_of_part(part, tiles) * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);
+            float depth = texelFetch(view_depth, ivec2(min(pixel, size - 1u)), 0).x;
+            if (is_in_part(depths, depth)) {
+                imageStore(visibility, ivec2(pixel), vec4(1.0));
+            }
         }
     } else {
         uint at = atomicAdd(penumbra.count, 1u);
         atomicMax(penumbra.groups_x, min(at + 1u, TILE_ROW));
         atomicMax(penumbra.groups_y, at / TILE_ROW + 1u);
         imageStore(penumbra_list, tile_entry_place(at, tiles), uvec4(entry));
-        imageStore(lists, list_place(tile), uvec4(first, count, resume, TILE_OPEN));
+        imageStore(lists, list_place(part), uvec4(first, count, resume, TILE_OPEN));
     }
 }

@@ -39,8 +39,8 @@ Entries entries_of(uvec4 first, uvec4 second) {
     return Entries(first.x, first.y, first.z, first.w, second.x, second.y);
 }
 
-ivec2 list_place(uvec2 tile) {
-    return ivec2(tile.x * LIST_TEXELS, tile.y);
+ivec2 list_place(uvec2 part) {
+    return ivec2(part.x * LIST_TEXELS, part.y);
 }
 
 ivec2 task_place(uint task) {

@@ -10,11 +10,8 @@
 
 layout(local_size_x = 8, local_size_y = 2) in;
 
-// The step: one of those below. A pipeline each, because each has code of its own.
-layout(constant_id = 1) const uint STEP = 0u;
-const uint STEP_TILES = 0u;
-const uint STEP_FURTHER = 1u;
-const uint STEP_WALK = 2u;
+// 1 for what lists do not know: a pipeline of its own, because it has code of its own.
+layout(constant_id = 1) const uint WALK = 0u;
 
 layout(set = 0, binding = 0, std140) uniform ViewBlock {
     ViewParams view;
@@ -44,6 +41,7 @@ layout(set = 0, binding = 17) uniform usampler2D triangle_pool;
 layout(push_constant) uniform Push {
     uint first_run; // of nodes, of this dispatch
     uint run;       // nodes of a run
+    uint further;   // 1 for the rest of long lists
 } push;
 
 #define SUN_TANGENT_SQUARE (view.light.axis_x.w * view.light.axis_x.w)
@@ -76,12 +74,13 @@ vec4 fetch_texture_texel(ivec2 place) {
 }
 
 // A receiver, and what its own plane hides.
-MaskReceiver fetch_receiver(uvec2 pixel, out uvec2 blocked) {
+MaskReceiver fetch_receiver(uvec2 pixel, vec2 depths, out uvec2 blocked) {
     uvec2 within = min(pixel, params.counts.xy - 1u);
     float depth = texelFetch(view_depth, ivec2(within), 0).x;
     vec3 ray = pixel_ray(view.camera, within);
     MaskReceiver receiver;
     receiver.position = view.camera.eye.xyz + depth * ray;
+    receiver.in_part = is_in_part(depths, depth);
     receiver.id = depth > 0.0 ? texelFetch(ids, ivec2(within), 0).x : 0u;
     vec3 normal = fetch_geometric_normal(max(receiver.id, 1u) - 1u);
     normal = dot(normal, ray) > 0.0 ? -normal : normal;
@@ -90,6 +89,9 @@ MaskReceiver fetch_receiver(uvec2 pixel, out uvec2 blocked) {
 }
 
 void store(uint tile, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 blocked, bool in_parts) {
+    if (!receiver.in_part) {
+        return;
+    }
     blocked = receiver.id == 0u ? uvec2(0u) : blocked;
     if (!in_parts) {
         // Stores beyond the picture's border are dropped.
@@ -100,7 +102,7 @@ void store(uint tile, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 bloc
     }
     for (uint word = 0u; word < 2u; ++word) {
         ivec2 place = word_place(tile, pixel % TILE_SIZE, params.pattern.y, 2u * block + word);
-        if (STEP != STEP_TILES) {
+        if (WALK != 0u || push.further != 0u) {
             imageAtomicOr(words, place, blocked[word]);
         } else {
             imageStore(words, place, uvec4(blocked[word]));
@@ -114,10 +116,13 @@ void main() {
         return;
     }
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
-    uvec4 task = STEP == STEP_FURTHER ? texelFetch(tasks, task_place(index), 0)
+    uvec4 task = push.further != 0u ? texelFetch(tasks, task_place(index), 0)
         : texelFetch(list, tile_entry_place(index, tiles), 0);
-    uvec2 tile = tile_of_entry(task.x, tiles);
-    ivec2 at = list_place(tile);
+    uvec2 part = part_of_entry(task.x, tiles);
+    uvec2 tile = tile_of_part(part, tiles);
+    uint number = tile.y * tiles.x + tile.x;
+    vec2 depths = fetch_part_depths(part);
+    ivec2 at = list_place(part);
     uvec4 stored = texelFetch(lists, at, 0);
     if (stored.w == TILE_SETTLED) {
         return;
@@ -132,46 +137,45 @@ void main() {
     uvec2 blocked_1;
     uvec2 blocked_2;
     uvec2 blocked_3;
-    MaskReceiver receiver_0 = fetch_receiver(pixel, blocked_0);
-    MaskReceiver receiver_1 = fetch_receiver(pixel + step, blocked_1);
-    MaskReceiver receiver_2 = fetch_receiver(pixel + 2u * step, blocked_2);
-    MaskReceiver receiver_3 = fetch_receiver(pixel + 3u * step, blocked_3);
+    MaskReceiver receiver_0 = fetch_receiver(pixel, depths, blocked_0);
+    MaskReceiver receiver_1 = fetch_receiver(pixel + step, depths, blocked_1);
+    MaskReceiver receiver_2 = fetch_receiver(pixel + 2u * step, depths, blocked_2);
+    MaskReceiver receiver_3 = fetch_receiver(pixel + 3u * step, depths, blocked_3);
     bool in_parts = params.pattern.y > 1u || entries.whole + entries.others > TASK_ENTRIES
         || stored.z < params.counts.z;
 
-    if (STEP != STEP_WALK) {
+    if (WALK == 0u) {
         Projection from_0 = projection_from(receiver_0);
         Projection from_1 = projection_from(receiver_1);
         Projection from_2 = projection_from(receiver_2);
         Projection from_3 = projection_from(receiver_3);
-        if (STEP == STEP_TILES) {
-            uint counts_0[2u * ROWS];
-            uint counts_1[2u * ROWS];
-            uint counts_2[2u * ROWS];
-            uint counts_3[2u * ROWS];
-            for (uint i = 0u; i < 2u * ROWS; ++i) {
-                counts_0[i] = NO_COUNT;
-                counts_1[i] = NO_COUNT;
-                counts_2[i] = NO_COUNT;
-                counts_3[i] = NO_COUNT;
-            }
-            for (uint i = 0u; i < entries.edges; ++i) {
-                uint code = texelFetch(edge_pool, triangle_texel_place(entries.first_edge + i), 0).x;
-                uint triangle = (code & ~(EDGE_DOUBLE | EDGE_TURNED)) >> EDGE_CORNER_BITS;
-                uint corner = code & ((1u << EDGE_CORNER_BITS) - 1u);
-                vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
-                vec3 b = fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
-                count_edge(from_0, a, b, code, counts_0);
-                count_edge(from_1, a, b, code, counts_1);
-                count_edge(from_2, a, b, code, counts_2);
-                count_edge(from_3, a, b, code, counts_3);
-            }
-            blocked_0 |= counted_mask(counts_0);
-            blocked_1 |= counted_mask(counts_1);
-            blocked_2 |= counted_mask(counts_2);
-            blocked_3 |= counted_mask(counts_3);
+        uint counts_0[2u * ROWS];
+        uint counts_1[2u * ROWS];
+        uint counts_2[2u * ROWS];
+        uint counts_3[2u * ROWS];
+        for (uint i = 0u; i < 2u * ROWS; ++i) {
+            counts_0[i] = NO_COUNT;
+            counts_1[i] = NO_COUNT;
+            counts_2[i] = NO_COUNT;
+            counts_3[i] = NO_COUNT;
         }
-        uint first = STEP == STEP_FURTHER ? task.y : 0u;
+        uint edges = push.further != 0u ? 0u : entries.edges;
+        for (uint i = 0u; i < edges; ++i) {
+            uint code = texelFetch(edge_pool, triangle_texel_place(entries.first_edge + i), 0).x;
+            uint triangle = (code & ~(EDGE_DOUBLE | EDGE_TURNED)) >> EDGE_CORNER_BITS;
+            uint corner = code & ((1u << EDGE_CORNER_BITS) - 1u);
+            vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
+            vec3 b = fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
+            count_edge(from_0, a, b, code, counts_0);
+            count_edge(from_1, a, b, code, counts_1);
+            count_edge(from_2, a, b, code, counts_2);
+            count_edge(from_3, a, b, code, counts_3);
+        }
+        blocked_0 |= counted_mask(counts_0);
+        blocked_1 |= counted_mask(counts_1);
+        blocked_2 |= counted_mask(counts_2);
+        blocked_3 |= counted_mask(counts_3);
+        uint first = push.further != 0u ? task.y : 0u;
         uint end = min(first + TASK_ENTRIES, entries.whole);
         for (uint i = first; i < end; ++i) {
             uint triangle = texelFetch(triangle_pool, triangle_texel_place(entries.first + i), 0).x;
@@ -205,7 +209,7 @@ void main() {
         uint first = (push.first_run + gl_WorkGroupID.z / params.pattern.y) * push.run;
         uint node = max(first, stored.z);
         uint end = min(first + push.run, params.counts.z);
-        Shaft shaft = fetch_shaft(tile);
+        Shaft shaft = fetch_shaft(part);
         while (node < end) {
             vec4 low = fetch_node_low(node);
             bool leaf = low.w >= 0.0;
@@ -220,8 +224,8 @@ void main() {
             }
         }
     }
-    store(task.x, block, pixel, receiver_0, blocked_0, in_parts);
-    store(task.x, block, pixel + step, receiver_1, blocked_1, in_parts);
-    store(task.x, block, pixel + 2u * step, receiver_2, blocked_2, in_parts);
-    store(task.x, block, pixel + 3u * step, receiver_3, blocked_3, in_parts);
+    store(number, block, pixel, receiver_0, blocked_0, in_parts);
+    store(number, block, pixel + step, receiver_1, blocked_1, in_parts);
+    store(number, block, pixel + 2u * step, receiver_2, blocked_2, in_parts);
+    store(number, block, pixel + 3u * step, receiver_3, blocked_3, in_parts);
 }

@@ -46,6 +46,7 @@ LightFrom light_from(Light light, vec3 p) {
 struct MaskReceiver {
     vec3 position; // scene space, metres
     uint id;       // of its triangle, plus one; 0 for none
+    bool in_part;  // whether its tile's part is the one at work
 };
 
 // The rows of a block of samples: params.rows, columns from the block's first one on.
@@ -281,7 +282,8 @@ void add_blocker(MaskReceiver receiver, LightFrom light, uint block, Blocker blo
     vec3 bc = line_of_plane(light, turn * exact_cross(b, c));
     vec3 ca = line_of_plane(light, turn * exact_cross(c, a));
     vec3 beyond = line_of_plane(light, turn * blocker.plane.xyz);
-    beyond.z -= LIGHT_SHAPE == LIGHT_SUN ? 0.0 : abs(height);
+    // What lies in the plane of the samples hides none of them, as what lies in the receiver does not hide it.
+    beyond.z -= LIGHT_SHAPE == LIGHT_SUN ? 0.0 : abs(height) + 4.0 * rounding_m;
     float most = min(min(line_most(ab), line_most(bc)), min(line_most(ca), line_most(beyond)));
     bool meets = most >= 0.0 && abs(height) > rounding_m && receiver.id != blocker.triangle + 1u;
     uvec2 within = mask_of_line(ab) & mask_of_line(bc) & mask_of_line(ca);

@@ -14,6 +14,9 @@ struct ShaftParams {
     // -1 to 1, samples stand at the whole columns plus 0.5 of y x + z, of a sun of
     // y x / sqrt(w + (tangent of half its angle * x)^2) + z.
     vec4 rows[MOST_ROWS];
+    // Of each row the strip of the light that its cells fill: least and most place along the second axis, narrowest and
+    // widest half chord.
+    vec4 strips[MOST_ROWS];
 };
 
 #endif

@@ -11,8 +11,8 @@
 
 // Four sides, two ends, and the surfaces' own plane where they have one.
 const uint SHAFT_PLANES = 7u;
-// Texels of a tile's shaft, side by side: planes, box, box of its surfaces, space between.
-const uint SHAFT_TEXELS = SHAFT_PLANES + 8u;
+// Texels of a tile's shaft, side by side: planes, box, box of its surfaces, space between, normals.
+const uint SHAFT_TEXELS = SHAFT_PLANES + 10u;
 
 // Rounding of positions, as a part of the largest coordinate: a few units of the last place. What is
 // nearer to a surface than that does not block its light.
@@ -21,13 +21,33 @@ const float POSITION_ROUNDING = 1.0 / 2097152.0;
 struct Shaft {
     vec4 planes[SHAFT_PLANES];
     vec4 low;  // xyz: of the box; w: 1 where all of the light is above all surfaces' planes
-    vec4 high; // xyz: of the box; w: 1 where every pixel of the tile has a surface
+    vec4 high; // xyz: of the box
 };
 
 vec4 fetch_shaft_texel(ivec2 place); // defined by the entry file
 
-Shaft fetch_shaft(uvec2 tile) {
-    ivec2 place = ivec2(tile.x * SHAFT_TEXELS, tile.y);
+// A tile across a gap in depth is worked on in two parts: one in front of the gap and one behind, each as a tile
+// of its own. The second part's number is greater by the number of all tiles.
+uvec2 part_of_entry(uint entry, uvec2 tiles) {
+    return uvec2(entry % tiles.x, entry / tiles.x);
+}
+
+uvec2 tile_of_part(uvec2 part, uvec2 tiles) {
+    return uvec2(part.x, part.y % tiles.y);
+}
+
+// View depths of a part's pixels, in metres: from x on, before y. The first part has those without surface.
+vec2 fetch_part_depths(uvec2 part) {
+    ivec2 place = ivec2(part.x * SHAFT_TEXELS + SHAFT_PLANES + 3u, part.y);
+    return vec2(fetch_shaft_texel(place).w, fetch_shaft_texel(place + ivec2(1, 0)).w);
+}
+
+bool is_in_part(vec2 depths, float depth) {
+    return depth >= depths.x && depth < depths.y;
+}
+
+Shaft fetch_shaft(uvec2 part) {
+    ivec2 place = ivec2(part.x * SHAFT_TEXELS, part.y);
     Shaft shaft;
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         shaft.planes[i] = fetch_shaft_texel(place + ivec2(i, 0));

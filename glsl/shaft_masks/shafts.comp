@@ -1,5 +1,5 @@
 #version 460
-// The shaft of each listed tile: the hull of two boxes, around its surfaces and around the light, along
+// The shaft of each listed tile, or of the parts of a tile that spans a gap in depth, which it lists: the hull of two boxes, around its surfaces and around the light, along
 // the axes of the light. One invocation a tile: all do the same work, without barriers.
 
 #include "common/tiles.glsl"
@@ -22,6 +22,10 @@ layout(set = 0, binding = 5, std140) uniform Arguments {
 };
 layout(set = 0, binding = 6) uniform usampler2D list;
 layout(set = 0, binding = 7, rgba32f) uniform writeonly image2D shafts;
+layout(set = 0, binding = 8, std430) buffer PartArguments {
+    TileArguments parts;
+};
+layout(set = 0, binding = 9, r32ui) uniform writeonly uimage2D part_list;
 
 vec4 fetch_triangle_texel(uint texel) {
     return texelFetch(triangles, triangle_texel_place(texel), 0);
@@ -39,6 +43,8 @@ vec4 fetch_shaft_texel(ivec2 place) {
 const float FAR = 1.0e38;
 // Room for rounding, as a part of the coordinates that go into a plane.
 const float SLACK = 1.0e-6;
+// Least gap in the depths of a tile that is worked on in two parts, as a part of all of its depth.
+const float LEAST_GAP = 0.3;
 // Normals whose coordinates differ by less are one.
 const float SAME_NORMAL = 1.0e-6;
 
@@ -75,7 +81,7 @@ mat3 surface_frame(uvec2 pixel, vec3 ray) {
 }
 
 // Surfaces of shaft_masks/sides.glsl. low, high: of the box in its frame, from some surface.
-void store_surfaces(ivec2 place, Light light, vec3 some, mat3 frame, vec3 low, vec3 high, float slack) {
+void store_surfaces(ivec2 place, Light light, vec3 some, mat3 frame, vec3 low, vec3 high, float slack, vec2 depths) {
     vec3 center = some + frame * (0.5 * low + 0.5 * high);
     vec3 half_size = 0.5 * high - 0.5 * low;
     float radius = length(half_size);
@@ -83,6 +89,7 @@ void store_surfaces(ivec2 place, Light light, vec3 some, mat3 frame, vec3 low, v
     float tilt = 0.0;
     float least = LIGHT_SHAPE == LIGHT_SUN ? dot(abs(z * frame), half_size) + slack : slack;
     float most = FAR;
+    float end = -FAR;
     if (LIGHT_SHAPE == LIGHT_SPHERE) {
         vec3 from = center - light.center.xyz;
         float away = length(from);
@@ -91,7 +98,9 @@ void store_surfaces(ivec2 place, Light light, vec3 some, mat3 frame, vec3 low, v
         z = outside ? from / away : z;
         // The samples' disk is across the line to the surface, radius^2 / distance from the centre.
         tilt = outside ? 2.0 * radius / away : 0.0;
-        least = outside ? light.axis_x.w * light.axis_x.w / nearest + slack : FAR;
+        float square = light.axis_x.w * light.axis_x.w;
+        least = outside ? square / nearest + slack : FAR;
+        end = outside ? square / (away + radius) - slack : -FAR;
     }
     if (LIGHT_SHAPE == LIGHT_POINT || LIGHT_SHAPE == LIGHT_LINE) {
         least = FAR; // their samples span no plane
@@ -103,11 +112,11 @@ void store_surfaces(ivec2 place, Light light, vec3 some, mat3 frame, vec3 low, v
         least = FAR;
     }
     imageStore(shafts, place, vec4(center, slack));
-    imageStore(shafts, place + ivec2(1, 0), vec4(frame[0] * half_size.x, 0.0));
-    imageStore(shafts, place + ivec2(2, 0), vec4(frame[1] * half_size.y, 0.0));
+    imageStore(shafts, place + ivec2(1, 0), vec4(frame[0] * half_size.x, depths.x));
+    imageStore(shafts, place + ivec2(2, 0), vec4(frame[1] * half_size.y, depths.y));
     imageStore(shafts, place + ivec2(3, 0), vec4(frame[2] * half_size.z, 0.0));
     imageStore(shafts, place + ivec2(4, 0), vec4(z, tilt));
-    imageStore(shafts, place + ivec2(5, 0), vec4(least, most, radius, 0.0));
+    imageStore(shafts, place + ivec2(5, 0), vec4(least, most, radius, end));
 }
 
 void main() {
@@ -121,15 +130,40 @@ void main() {
     Light light = view.light;
     vec3 eye = view.camera.eye.xyz;
 
-    // A surface of the tile, for the frames.
-    float deepest = 0.0;
-    uvec2 at = tile * TILE_SIZE;
+    // The gap in the middle of the tile's depths.
+    float nearest = FAR;
+    float farthest = 0.0;
     for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
         float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
-        at = depth > deepest ? pixel : at;
-        deepest = max(deepest, depth);
+        nearest = depth > 0.0 ? min(nearest, depth) : nearest;
+        farthest = max(farthest, depth);
     }
+    float middle = 0.5 * nearest + 0.5 * farthest;
+    float before_gap = 0.0;
+    float after_gap = FAR;
+    uvec2 at_near = tile * TILE_SIZE;
+    uvec2 at_far = tile * TILE_SIZE;
+    for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
+        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
+        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        at_near = depth < middle && depth > before_gap ? pixel : at_near;
+        before_gap = depth < middle ? max(before_gap, depth) : before_gap;
+        after_gap = depth >= middle ? min(after_gap, depth) : after_gap;
+        at_far = depth == farthest ? pixel : at_far;
+    }
+    float width = nearest * float(TILE_SIZE) * length(view.camera.pixel_right.xyz);
+    float gap = after_gap - before_gap;
+    bool split = MOST_PARTS > 1u && before_gap > 0.0 && gap > width && gap > LEAST_GAP * (farthest - nearest);
+    bool behind = gl_GlobalInvocationID.y > 0u;
+    if (behind && !split) {
+        return;
+    }
+    vec2 depths = !split ? vec2(0.0, FAR) : behind ? vec2(after_gap, FAR) : vec2(0.0, after_gap);
+
+    // A surface, for the frames.
+    uvec2 at = split && !behind ? at_near : at_far;
+    float deepest = split && !behind ? before_gap : farthest;
     vec3 some = eye + deepest * pixel_ray(view.camera, at);
     mat3 frame = light_frame(light, some);
     mat3 box_frame = surface_frame(at, pixel_ray(view.camera, at));
@@ -147,7 +181,6 @@ void main() {
     vec3 box_high = vec3(-FAR);
     vec3 normal_low = vec3(2.0);
     vec3 normal_high = vec3(-2.0);
-    bool all_hit = true;
     bool above = true;
     vec3 normal = vec3(0.0);
     float plane_low = FAR;
@@ -156,9 +189,7 @@ void main() {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
         float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
         uint id = texelFetch(ids, ivec2(pixel), 0).x;
-        bool hit = depth > 0.0;
-        all_hit = all_hit && hit;
-        if (hit) {
+        if (depth > 0.0 && is_in_part(depths, depth)) {
             vec3 ray = pixel_ray(view.camera, pixel);
             vec3 p = eye + depth * ray;
             vec3 n = fetch_geometric_normal(id - 1u);
@@ -210,7 +241,19 @@ void main() {
     float rounding = POSITION_ROUNDING * extent_m;
     bool flat_tile = all(lessThan(normal_high - normal_low, vec3(SAME_NORMAL)))
         && plane_high - plane_low <= 4.0 * rounding;
-    planes[6] = flat_tile ? vec4(-normal, -plane_high - rounding) : vec4(vec3(0.0), FAR);
+    planes[6] = vec4(vec3(0.0), FAR);
+    if (flat_tile) {
+        planes[6] = vec4(-normal, -plane_high - rounding);
+    } else {
+        // Else what is below the lowest of them, where all of the light is above that.
+        bool turned = dot(box_frame[2], pixel_ray(view.camera, at)) > 0.0;
+        vec3 up = turned ? -box_frame[2] : box_frame[2];
+        float lowest = turned ? -own_high.z : own_low.z;
+        vec3 to_light = light_offset(light, some);
+        bool is_above = dot(up, to_light) - dot(abs(up), light_reach)
+            > (LIGHT_SHAPE == LIGHT_SUN ? SLACK : lowest + slack);
+        planes[6] = is_above ? vec4(-up, slack - lowest - dot(up, some)) : planes[6];
+    }
 
     if (LIGHT_SHAPE == LIGHT_SUN) {
         // A box around a cone without end has sides at most where no direction leads.
@@ -221,14 +264,20 @@ void main() {
         box_low = min(box_low, light.center.xyz - light_reach);
         box_high = max(box_high, light.center.xyz + light_reach);
     }
-    ivec2 place = ivec2(tile.x * SHAFT_TEXELS, tile.y);
+    uvec2 part = uvec2(tile.x, tile.y + (behind ? tiles.y : 0u));
+    ivec2 place = ivec2(part.x * SHAFT_TEXELS, part.y);
     store_surfaces(place + ivec2(SHAFT_PLANES + 2u, 0), light, some, box_frame, own_low - slack,
-        own_high + slack, slack);
+        own_high + slack, slack, depths);
+    imageStore(shafts, place + ivec2(SHAFT_PLANES + 8u, 0), vec4(normal_low, 0.0));
+    imageStore(shafts, place + ivec2(SHAFT_PLANES + 9u, 0), vec4(normal_high, 0.0));
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         imageStore(shafts, place + ivec2(i, 0), planes[i]);
     }
     vec4 first = vec4(box_low - slack, above ? 1.0 : 0.0);
-    vec4 last = vec4(box_high + slack, all_hit ? 1.0 : 0.0);
+    vec4 last = vec4(box_high + slack, 0.0);
     imageStore(shafts, place + ivec2(SHAFT_PLANES, 0), first);
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 1u, 0), last);
-}
+    uint slot = atomicAdd(parts.count, 1u);
+    imageStore(part_list, tile_entry_place(slot, tiles), uvec4(part.y * tiles.x + part.x));
+}layout(constant_id = 2) const uint MOST_PARTS = 2u; // that a tile is worked on in
+

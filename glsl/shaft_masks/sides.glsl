@@ -3,6 +3,7 @@
 #ifndef ANTUMBRA_SHAFT_MASKS_SIDES_GLSL
 #define ANTUMBRA_SHAFT_MASKS_SIDES_GLSL
 
+#include "common/tiles.glsl"
 #include "shaft_masks/shaft.glsl"
 
 // A tile's surfaces, and the space between them and the light.
@@ -11,6 +12,8 @@ struct Surfaces {
     vec3 axes[3];   // half its edges
     float radius_m; // half its diagonal
     float margin_m; // room for rounding
+    vec3 normal_low; // box around their normals, on the seen side
+    vec3 normal_high;
     // Points a between, for every surface, are those with dot(a - origin, z) - tilt * |a - origin| > low and
     // dot(a - origin, z) + tilt * (|a - center| + radius) < high: z is across the light's plane, or, where
     // that plane turns with the surface, turns by an angle of at most tilt.
@@ -19,10 +22,11 @@ struct Surfaces {
     float tilt;
     float low;
     float high;
+    float end; // with dot(a - origin, z) + tilt * |a - origin| less than this they are beyond the light
 };
 
-Surfaces fetch_surfaces(uvec2 tile, Light light) {
-    ivec2 place = ivec2(tile.x * SHAFT_TEXELS + SHAFT_PLANES + 2u, tile.y);
+Surfaces fetch_surfaces(uvec2 part, Light light) {
+    ivec2 place = ivec2(part.x * SHAFT_TEXELS + SHAFT_PLANES + 2u, part.y);
     vec4 center = fetch_shaft_texel(place);
     vec4 x = fetch_shaft_texel(place + ivec2(1, 0));
     vec4 y = fetch_shaft_texel(place + ivec2(2, 0));
@@ -30,8 +34,9 @@ Surfaces fetch_surfaces(uvec2 tile, Light light) {
     vec4 across = fetch_shaft_texel(place + ivec2(4, 0));
     vec4 ends = fetch_shaft_texel(place + ivec2(5, 0));
     vec3 origin = LIGHT_SHAPE == LIGHT_SUN ? center.xyz : light.center.xyz;
-    return Surfaces(center.xyz, vec3[3](x.xyz, y.xyz, z.xyz), ends.z, center.w, origin, across.xyz,
-        across.w, ends.x, ends.y);
+    return Surfaces(center.xyz, vec3[3](x.xyz, y.xyz, z.xyz), ends.z, center.w,
+        fetch_shaft_texel(place + ivec2(6, 0)).xyz, fetch_shaft_texel(place + ivec2(7, 0)).xyz, origin,
+        across.xyz, across.w, ends.x, ends.y, ends.w);
 }
 
 // Whether all points within radius_m of a are between.
@@ -49,6 +54,28 @@ bool triangle_is_between(Surfaces surfaces, vec3 a, vec3 b, vec3 c) {
 // The most that a surface is off the box's centre along n.
 float surfaces_extent(Surfaces surfaces, vec3 n) {
     return abs(dot(n, surfaces.axes[0])) + abs(dot(n, surfaces.axes[1])) + abs(dot(n, surfaces.axes[2]));
+}
+
+// Whether a triangle is beyond the samples' plane, seen from every surface.
+bool is_beyond_light(Surfaces surfaces, vec3 a, vec3 b, vec3 c) {
+    vec3 from_a = a - surfaces.origin;
+    vec3 from_b = b - surfaces.origin;
+    vec3 from_c = c - surfaces.origin;
+    vec3 heights = vec3(dot(from_a, surfaces.z), dot(from_b, surfaces.z), dot(from_c, surfaces.z))
+        + surfaces.tilt * vec3(length(from_a), length(from_b), length(from_c));
+    return max(heights.x, max(heights.y, heights.z)) < surfaces.end;
+}
+
+// Whether a triangle is below the planes of all surfaces, where it hides nothing that they do not.
+bool is_below(Surfaces surfaces, vec3 a, vec3 b, vec3 c) {
+    vec3 low = surfaces.normal_low;
+    vec3 high = surfaces.normal_high;
+    float most = max(most_along(low, high, a - surfaces.center),
+        max(most_along(low, high, b - surfaces.center), most_along(low, high, c - surfaces.center)));
+    for (uint i = 0u; i < 3u; ++i) {
+        most += max(most_along(low, high, surfaces.axes[i]), most_along(low, high, -surfaces.axes[i]));
+    }
+    return most <= 0.0;
 }
 
 // Sides of a triangle.

@@ -58,7 +58,13 @@ impl CapturedImage {
 }
 
 /// Names that stand for an image of the frame, whatever that is called in the graph.
-pub const FRIENDLY_NAMES: [&str; 4] = ["depth", "normal", "shading_normal", "visibility"];
+pub const FRIENDLY_NAMES: [&str; 5] = [
+    "depth",
+    "normal",
+    "shading_normal",
+    "visibility",
+    "visibility_bound",
+];
 
 /// A dump on its way: what is copied, and what becomes of it.
 pub(super) struct Dump {
@@ -110,6 +116,10 @@ impl Dump {
             "normal" => Some((gbuffer.geometric_normal, ImageContent::Normals)),
             "shading_normal" => Some((gbuffer.shading_normal, ImageContent::Normals)),
             "visibility" => (frame.visibility.first()).map(|id| (*id, ImageContent::Values)),
+            "visibility_bound" => {
+                let bound = frame.masks.first().and_then(|mask| mask.error_bound);
+                bound.map(|id| (id, ImageContent::Values))
+            }
             _ => None,
         };
         if let Some((image, content)) = friendly {

@@ -85,7 +85,8 @@ impl<'s> FrameRenderer<'s> {
 
     /// As [`render`](Self::render), and brings back images of the frame by name: `depth` (metres
     /// along the view direction, 0 where nothing was hit), `normal` and `shading_normal` (world
-    /// axes), `visibility` (of the first light), or any image that the frame writes, under its name
+    /// axes), `visibility` (of the first light), `visibility_bound` (the most that it is off, where the
+    /// technique proves that), or any image that the frame writes, under its name
     /// in the [`Plan`]; `NAME[LAYER]` and `NAME[LAYER,LEVEL]` are parts of it.
     ///
     /// # Errors

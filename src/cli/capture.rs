@@ -59,6 +59,14 @@ pub(super) struct CaptureArgs {
     )]
     visibility: Option<ImageTemplate>,
 
+    /// The most that the visibility of the first light (or --light) is off, at each pixel: as for
+    /// --visibility. Of techniques that prove it: shaft-masks
+    #[arg(
+        long, value_name = "FILE",
+        value_parser = PathBufValueParser::new().try_map(ImageTemplate::by_ending)
+    )]
+    visibility_bound: Option<ImageTemplate>,
+
     /// Image of the frame by name: depth (metres along the view, 0 where nothing is), normal,
     /// shading_normal, visibility, or any that `antumbra graph` lists; NAME[2] is its layer 2,
     /// NAME[2,1] mip level 1 of that. .exr has the numbers, .png a picture of them. Repeatable
@@ -108,7 +116,14 @@ pub(super) struct CaptureArgs {
     view: ViewArgs,
 }
 
-pub(super) fn run(args: &CaptureArgs) -> Result<(), CliError> {
+pub(super) fn run(mut args: CaptureArgs) -> Result<(), CliError> {
+    // An image of the frame like others.
+    args.dump
+        .extend(args.visibility_bound.take().map(|file| DumpArg {
+            name: "visibility_bound".into(),
+            file,
+        }));
+    let args = &args;
     let Some(timeline) = timeline(args)? else {
         return Ok(());
     };

@@ -74,7 +74,7 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> 
     signals::handle_termination();
     let result = match Cli::try_parse_from(arguments) {
         Ok(cli) => match cli.command {
-            Command::Capture(args) => capture::run(&args),
+            Command::Capture(args) => capture::run(*args),
             Command::Info(args) => info::run(&args),
             Command::Techniques(args) => techniques::run(&args),
             Command::Graph(args) => graph::run(&args),

@@ -88,7 +88,7 @@ pub(super) fn add_passes<'f>(
     let params = add_params(graph, inputs, params);
     let silhouettes = add_silhouettes(graph, inputs, NAME, SilhouetteRule::WholeLight, 1);
     let receivers = add_receivers(graph, inputs, NAME, reach(&shape));
-    let shafts = add_shafts(graph, inputs, NAME, params, &receivers);
+    let (shafts, _) = add_shafts(graph, inputs, (NAME, 1), params, &receivers);
     let tools = Lists {
         params,
         silhouettes,

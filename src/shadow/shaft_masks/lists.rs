@@ -1,12 +1,11 @@
 //! The passes that find what is between tiles and the light.
 
-use super::{LIST_TEXELS, Lists, NAME, POOL_WIDTH, Sizes, masks, texels};
+use super::{LIST_TEXELS, Lists, NAME, PARTS, POOL_WIDTH, Sizes, masks, part_list, texels};
 use crate::geometry::{TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
     Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
 };
-use crate::shadow::receivers::Receivers;
 use crate::shadow::{ShadowInputs, shape_number};
 use ash::vk;
 
@@ -25,6 +24,7 @@ struct Candidates {
     used: BufferId,
     further: BufferId,
     partial: TileList,
+    pieces: TileList,
 }
 
 impl Making {
@@ -33,9 +33,10 @@ impl Making {
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        receivers: &Receivers,
+        parts: TileList,
+        visibility: ImageId,
     ) -> (Lists, ImageId) {
-        let (candidates, visibility) = self.add_candidates(graph, inputs, receivers);
+        let (candidates, visibility) = self.add_candidates(graph, inputs, parts, visibility);
         self.add_entries(graph, inputs, candidates, visibility)
     }
 
@@ -43,20 +44,23 @@ impl Making {
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        receivers: &Receivers,
+        parts: TileList,
+        visibility: ImageId,
     ) -> (Candidates, ImageId) {
         let name = &inputs.light_name;
         let size = inputs.camera.size();
         let [across, down] = tile_counts(size);
         let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
-        let mut penumbra = TileList::create(graph, &format!("{NAME}.penumbra {name}"), size);
-        let mut partial = TileList::create(graph, &format!("{NAME}.partial {name}"), size);
+        let mut penumbra = part_list(graph, inputs, "penumbra");
+        let mut partial = part_list(graph, inputs, "partial");
+        let mut pieces = part_list(graph, inputs, "pieces");
         let sixteen = BufferDesc { size: 16 };
         let used = graph.create_buffer(format!("{NAME}.used {name}"), sixteen);
         let further = graph.create_buffer(format!("{NAME}.further {name}"), sixteen);
         let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
         penumbra.clear(&mut pass);
         partial.clear(&mut pass);
+        pieces.clear(&mut pass);
         let used = pass.overwrite(used, Access::Clear);
         let further = pass.overwrite(further, Access::Clear);
         let runs = masks::runs_in_dispatch(inputs.scene.node_count() as u32, &sizes);
@@ -67,6 +71,7 @@ impl Making {
             (penumbra.arguments, none),
             (further, none),
             (partial.arguments, no_partial),
+            (pieces.arguments, [0, 1, 1, 0]),
             (used, [0; 4]),
         ];
         pass.record(move |ctx| {
@@ -79,32 +84,32 @@ impl Making {
         let pool = texels(vk::Format::R32_UINT, sizes.pool_rows * POOL_WIDTH);
         let pool = graph.create_image(format!("{NAME}.pool {name}"), pool);
         let format = vk::Format::R32G32B32A32_UINT;
-        let desc = ImageDesc::new(format, across * LIST_TEXELS, down);
+        let desc = ImageDesc::new(format, across * LIST_TEXELS, down * PARTS);
         let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
         let hierarchy = inputs.ids.hierarchy;
+        let view_depth = inputs.gbuffer.view_depth;
         let (view_params, part) = inputs.view_params;
-        let tiles = receivers.list;
         let shape = shape_number(&inputs.light.shape);
         let mut pass = graph.pass(format!("{NAME}.lists {name}"), PassKind::Compute);
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
-        for image in [hierarchy, shafts] {
+        for image in [hierarchy, shafts, view_depth] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
-        tiles.read(&mut pass);
+        parts.read(&mut pass);
         penumbra.fill(&mut pass);
         let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
         let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
         let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
-        let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
+        let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
                 Bind::sampled(2, hierarchy, nearest),
-                Bind::uniform(3, tiles.arguments),
-                Bind::sampled(4, tiles.tiles, nearest),
+                Bind::uniform(3, parts.arguments),
+                Bind::sampled(4, parts.tiles, nearest),
                 Bind::sampled(5, shafts, nearest),
                 Bind::storage_buffer(6, penumbra.arguments),
                 Bind::storage_image(7, penumbra.tiles),
@@ -112,6 +117,7 @@ impl Making {
                 Bind::storage_image(9, pool),
                 Bind::storage_image(10, lists),
                 Bind::storage_image(11, visibility),
+                Bind::sampled(12, view_depth, nearest),
             ];
             let shader = &spirv::SHAFT_MASKS_LISTS_COMP;
             let pipeline = ComputePipelineDesc {
@@ -119,7 +125,7 @@ impl Making {
                 ..ComputePipelineDesc::new(shader)
             };
             ctx.bind_compute(&pipeline, &bindings, &[])?;
-            ctx.dispatch(shader.groups([across * down, 1, 1]));
+            ctx.dispatch(shader.groups([across * down * PARTS, 1, 1]));
             Ok(())
         });
         let candidates = Candidates {
@@ -129,6 +135,7 @@ impl Making {
             used,
             further,
             partial,
+            pieces,
         };
         (candidates, visibility)
     }
@@ -149,6 +156,7 @@ impl Making {
             used,
             further,
             mut partial,
+            mut pieces,
         } = candidates;
         let edges = texels(vk::Format::R32_UINT, sizes.edge_rows * POOL_WIDTH);
         let edges = graph.create_image(format!("{NAME}.edges {name}"), edges);
@@ -177,6 +185,7 @@ impl Making {
         }
         tiles.read(&mut pass);
         partial.fill(&mut pass);
+        pieces.fill(&mut pass);
         let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
         let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
         let further = pass.write(further, Access::StorageReadWrite(Stage::Compute));
@@ -206,6 +215,8 @@ impl Making {
                 Bind::storage_image(16, tasks),
                 Bind::storage_buffer(17, partial.arguments),
                 Bind::storage_image(18, partial.tiles),
+                Bind::storage_buffer(19, pieces.arguments),
+                Bind::storage_image(20, pieces.tiles),
             ];
             let pipeline = ComputePipelineDesc {
                 constants: vec![(0, shape), (4, sizes.task_entries)],
@@ -222,6 +233,7 @@ impl Making {
             further,
             tasks,
             partial,
+            pieces,
         };
         (lists, visibility)
     }

@@ -22,6 +22,7 @@ pub(super) fn runs_in_dispatch(nodes: u32, sizes: &Sizes) -> u32 {
 struct Push {
     first_run: u32,
     run: u32,
+    further: u32,
 }
 
 /// What the tiles are worked on for.
@@ -87,6 +88,7 @@ impl Masks {
             further,
             tasks,
             partial,
+            ..
         } = self.lists;
         let (arguments, list, what) = match step {
             Step::Tiles => (tiles.arguments, tiles.tiles, "masks"),
@@ -120,15 +122,18 @@ impl Masks {
             pass.write(words, Access::StorageReadWrite(Stage::Compute))
         };
         let run = self.sizes.run_nodes;
-        let (step, first_run) = match step {
-            Step::Tiles => (0, 0),
-            Step::Further => (1, 0),
-            Step::Walk(first_run) => (2, first_run),
+        let (walk, first_run) = match step {
+            Step::Tiles | Step::Further => (0, 0),
+            Step::Walk(first_run) => (1, first_run),
         };
-        let push = Push { first_run, run };
+        let push = Push {
+            first_run,
+            run,
+            further: u32::from(step == Step::Further),
+        };
         let constants = vec![
             (0, shape_number(&inputs.light.shape)),
-            (1, step),
+            (1, walk),
             (3, u32::from(inputs.scene.has_masks())),
             (4, self.sizes.task_entries),
         ];
@@ -171,32 +176,30 @@ impl Masks {
         (visibility, words): (ImageId, ImageId),
     ) -> ImageId {
         let name = &inputs.light_name;
-        let params = self.params;
-        let Lists { tiles, lists, .. } = self.lists;
+        let (params, shafts) = (self.params, self.shafts);
+        let view_depth = inputs.gbuffer.view_depth;
+        let pieces = self.lists.pieces;
         let mut pass = graph.pass(format!("{NAME}.resolve {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
-        tiles.read(&mut pass);
-        for image in [lists, words] {
+        pieces.read(&mut pass);
+        for image in [words, view_depth, shafts] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
-        let task_entries = self.sizes.task_entries;
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
-            let pipeline = ComputePipelineDesc {
-                constants: vec![(4, task_entries)],
-                ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_RESOLVE_COMP)
-            };
+            let pipeline = ComputePipelineDesc::new(&spirv::SHAFT_MASKS_RESOLVE_COMP);
             let bindings = [
                 Bind::uniform(0, params),
-                Bind::uniform(1, tiles.arguments),
-                Bind::sampled(2, tiles.tiles, nearest),
-                Bind::sampled(3, lists, nearest),
-                Bind::sampled(4, words, nearest),
-                Bind::storage_image(5, visibility),
+                Bind::uniform(1, pieces.arguments),
+                Bind::sampled(2, pieces.tiles, nearest),
+                Bind::sampled(3, words, nearest),
+                Bind::storage_image(4, visibility),
+                Bind::sampled(5, view_depth, nearest),
+                Bind::sampled(6, shafts, nearest),
             ];
             ctx.bind_compute(&pipeline, &bindings, &[])?;
-            tiles.dispatch(ctx)
+            pieces.dispatch(ctx)
         });
         visibility
     }

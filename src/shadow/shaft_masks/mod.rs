@@ -15,14 +15,16 @@
 //! |---|---|
 //! | `params` | rows of samples |
 //! | `start`, `tiles` | the picture's tiles that some of the light is above |
-//! | `shafts` | their shafts, and boxes around their surfaces |
+//! | `shafts` | the tiles, in two parts where they span a gap in depth; their shafts, and boxes around their surfaces |
 //! | `lists` | lit tiles settled; candidates of the others |
 //! | `entries` | dark tiles settled; edges and triangles of the others |
 //! | `masks` | visibility of the others, or what the beginnings of long lists hide |
 //! | `further` | what the rest of long lists hides |
 //! | `walk` | what triangles hide that lists had no room for |
 //! | `resolve` | visibility of the tiles of the last two, and where there are more than 64 samples |
+//! | `no_bound`, `bound` | a bound on the error, if anything reads it |
 
+mod bound;
 mod lists;
 mod masks;
 mod options;
@@ -33,7 +35,7 @@ pub use samples::light_samples;
 
 use super::receivers::{Receivers, add_receivers};
 use super::{ShadowInputs, ShadowMask, shape_number};
-use crate::geometry::{TileList, tile_counts};
+use crate::geometry::{TILE_SIZE, TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
     Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
@@ -52,7 +54,7 @@ const MOST_ROWS: usize = 32;
 const BLOCK: u32 = 8;
 
 /// `SHAFT_TEXELS` in `shaft_masks/shaft.glsl`.
-const SHAFT_TEXELS: u32 = 15;
+const SHAFT_TEXELS: u32 = 17;
 
 /// `LIST_TEXELS` in `shaft_masks/lists.glsl`.
 const LIST_TEXELS: u32 = 3;
@@ -73,10 +75,14 @@ struct ShaftParams {
     counts: [u32; 4],
     pattern: [u32; 4],
     rows: [[f32; 4]; MOST_ROWS],
+    strips: [[f32; 4]; MOST_ROWS],
 }
 
 /// Fewest tiles that lists have room for.
 const LEAST_TILES: u32 = 1024;
+
+/// Parts of a tile that spans a gap in depth.
+const PARTS: u32 = 2;
 
 /// What is between the tiles that need masks and the light.
 #[derive(Clone, Copy, Debug)]
@@ -95,6 +101,8 @@ struct Lists {
     tasks: ImageId,
     /// Tiles whose lists do not know all triangles.
     partial: TileList,
+    /// Tiles whose masks are made in pieces: of long lists, or of several blocks of samples.
+    pieces: TileList,
 }
 
 /// Sizes of what the device fills.
@@ -156,20 +164,22 @@ pub(super) fn add_passes<'f>(
             0,
         ],
         rows: [[0.0; 4]; MOST_ROWS],
+        strips: [[0.0; 4]; MOST_ROWS],
     };
     let rows = samples::rows(&inputs.light.shape, options.side);
-    for (texel, row) in params.rows.iter_mut().zip(rows) {
-        *texel = row.texel();
+    for (at, row) in rows.into_iter().enumerate() {
+        params.rows[at] = row.texel();
+        params.strips[at] = row.strip_texel(&inputs.light.shape);
     }
     let buffer = add_params(graph, inputs, params);
     let receivers = add_receivers(graph, inputs, NAME, reach(&inputs.light.shape));
-    let shafts = add_shafts(graph, inputs, NAME, buffer, &receivers);
+    let (shafts, parts) = add_shafts(graph, inputs, (NAME, PARTS), buffer, &receivers);
     let making = lists::Making {
         params: buffer,
         shafts,
         sizes,
     };
-    let (lists, visibility) = making.add(graph, inputs, &receivers);
+    let (lists, visibility) = making.add(graph, inputs, parts, receivers.visibility);
     let masks = masks::Masks {
         sizes,
         nodes,
@@ -178,7 +188,17 @@ pub(super) fn add_passes<'f>(
         lists,
     };
     let visibility = masks.add(graph, inputs, visibility);
-    ShadowMask::new(visibility)
+    ShadowMask {
+        error_bound: Some(masks.add_bound(graph, inputs)),
+        ..ShadowMask::new(visibility)
+    }
+}
+
+/// A list of tiles or their parts.
+fn part_list(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, what: &str) -> TileList {
+    let [across, down] = tile_counts(inputs.camera.size());
+    let size = [across * TILE_SIZE, down * TILE_SIZE * PARTS];
+    TileList::create(graph, &format!("{NAME}.{what} {}", inputs.light_name), size)
 }
 
 /// Distance from the light's centre to its farthest point, of a sun at distance 1.
@@ -201,21 +221,27 @@ fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: ShaftPar
 
 /// Declares the pass that finds the shaft of each listed tile. `params`: a uniform buffer of the size
 /// of [`ShaftParams`] that begins with the width and height of the picture.
+/// With `most_parts` 1 tiles are left whole, and the parts listed are the tiles.
 pub(super) fn add_shafts(
     graph: &mut Graph<'_>,
     inputs: &ShadowInputs<'_>,
-    technique: &str,
+    (technique, most_parts): (&str, u32),
     params: BufferId,
     receivers: &Receivers,
-) -> ImageId {
+) -> (ImageId, TileList) {
     let name = &inputs.light_name;
     let [across, down] = tile_counts(inputs.camera.size());
     let format = vk::Format::R32G32B32A32_SFLOAT;
-    let desc = ImageDesc::new(format, across * SHAFT_TEXELS, down);
+    let desc = ImageDesc::new(format, across * SHAFT_TEXELS, down * most_parts);
     let shafts = graph.create_image(format!("{technique}.shafts {name}"), desc);
     let (gbuffer, triangles) = (inputs.gbuffer, inputs.ids.triangles);
     let (view_params, part) = inputs.view_params;
     let tiles = receivers.list;
+    let mut parts = part_list(graph, inputs, "parts");
+    let mut pass = graph.pass(format!("{technique}.begin {name}"), PassKind::Transfer);
+    parts.clear(&mut pass);
+    let cleared = parts;
+    pass.record(move |ctx| cleared.record_clear(ctx));
     let shape = shape_number(&inputs.light.shape);
     let mut pass = graph.pass(format!("{technique}.shafts {name}"), PassKind::Compute);
     pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
@@ -224,6 +250,7 @@ pub(super) fn add_shafts(
         pass.read(image, Access::Sampled(Stage::Compute));
     }
     tiles.read(&mut pass);
+    parts.fill(&mut pass);
     let shafts = pass.overwrite(shafts, Access::StorageWrite(Stage::Compute));
     pass.record(move |ctx| {
         let nearest = SamplerDesc::nearest();
@@ -236,15 +263,17 @@ pub(super) fn add_shafts(
             Bind::uniform(5, tiles.arguments),
             Bind::sampled(6, tiles.tiles, nearest),
             Bind::storage_image(7, shafts),
+            Bind::storage_buffer(8, parts.arguments),
+            Bind::storage_image(9, parts.tiles),
         ];
         let shader = &spirv::SHAFT_MASKS_SHAFTS_COMP;
         let pipeline = ComputePipelineDesc {
-            constants: vec![(0, shape)],
+            constants: vec![(0, shape), (2, most_parts)],
             ..ComputePipelineDesc::new(shader)
         };
         ctx.bind_compute(&pipeline, &bindings, &[])?;
-        ctx.dispatch(shader.groups([across * down, 1, 1]));
+        ctx.dispatch(shader.groups([across * down, most_parts, 1]));
         Ok(())
     });
-    shafts
+    (shafts, parts)
 }

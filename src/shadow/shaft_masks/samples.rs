@@ -17,12 +17,29 @@ pub(super) struct Row {
     middle: f64,
     /// 1 + (tangent * y)^2.
     w: f64,
+    /// Least and most place along the second axis of the part of the light that the row stands for.
+    strip: [f64; 2],
 }
 
 impl Row {
     /// As shaders read it.
     pub(super) fn texel(&self) -> [f32; 4] {
         [self.y, self.scale, self.middle, self.w].map(|v| v as f32)
+    }
+
+    /// The row's strip, as shaders read it: its least and most place along the second axis, and the
+    /// narrowest and the widest half chord there; of lights that are not round the whole width.
+    pub(super) fn strip_texel(&self, shape: &LightShape) -> [f32; 4] {
+        let [from, to] = self.strip;
+        let [narrow, wide] = match shape {
+            LightShape::Disk { .. } | LightShape::Sphere { .. } | LightShape::Sun { .. } => {
+                let chord = |y: f64| (1.0 - y * y).max(0.0).sqrt();
+                let middle = 0.0_f64.clamp(from, to);
+                [chord(from).min(chord(to)), chord(middle)]
+            }
+            LightShape::Point | LightShape::Rect { .. } | LightShape::Line { .. } => [1.0, 1.0],
+        };
+        [from, to, narrow, wide].map(|v| v as f32)
     }
 
     /// Place along the first axis of the sample in a column.
@@ -49,6 +66,7 @@ pub(super) fn rows(shape: &LightShape, side: u32) -> Vec<Row> {
         scale,
         middle,
         w: 1.0,
+        strip: [y - 1.0 / count, y + 1.0 / count],
     };
     match shape {
         LightShape::Point | LightShape::Rect { .. } => (0..side)
@@ -114,6 +132,7 @@ fn strips(side: u32, tangent: f64) -> Vec<Row> {
             scale: 0.5 * count * (w + (tangent * half).powi(2)).sqrt() / half,
             middle: 0.5 * count,
             w,
+            strip: [place(from), place(to)],
         }
     };
     (0..side).map(row).collect()

@@ -139,6 +139,13 @@ float soft_cells(Place here, LightView light_view) {
             }
             Seen near = look_at(here, light_view, near_entry, at);
             Seen far = look_at(here, light_view, far_entry, at);
+            if (MASKED != 0u && blocked && near.number != 0u) {
+                // What is shown clearly before the edge is a blocker without edges.
+                const float BEFORE = 1.03;
+                float shown = rise_of(here, light_view, shown_depth(here, light_view, map));
+                bool before = shown > BEFORE * rise_of(here, light_view, near.depth);
+                near.number = before ? 0u : near.number;
+            }
             if (cell == 0u) {
                 Seen wide = near.number != 0u && (far.number == 0u || near.width > far.width) ? near : far;
                 depth = wide.depth;

@@ -22,6 +22,8 @@ layout(set = 0, binding = 5, std140) uniform Arguments {
 };
 layout(set = 0, binding = 6) uniform usampler2D list;
 layout(set = 0, binding = 7, rgba32f) uniform writeonly image2D shafts;
+layout(constant_id = 2) const uint MOST_PARTS = 2u; // that a tile is worked on in
+
 layout(set = 0, binding = 8, std430) buffer PartArguments {
     TileArguments parts;
 };
@@ -279,5 +281,5 @@ void main() {
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 1u, 0), last);
     uint slot = atomicAdd(parts.count, 1u);
     imageStore(part_list, tile_entry_place(slot, tiles), uvec4(part.y * tiles.x + part.x));
-}layout(constant_id = 2) const uint MOST_PARTS = 2u; // that a tile is worked on in
+}
 

@@ -41,6 +41,10 @@ layout(set = 0, binding = 10, std140) uniform RayBlock {
 // Rounding of depths and places, as a part of them: 16 units of single precision's last place.
 const float ROUNDING = 1.0 / 1048576.0;
 
+// What a view reaches beyond its face of the cube at most: distance by depth at a corner, with a margin
+// of 0.5.
+const float FARTHEST_BY_DEPTH = 2.35;
+
 // Texels across and down that are looked at one by one, for all rays at once.
 const int MOST_ALIKE = 3;
 
@@ -262,9 +266,18 @@ uvec4 not_free(Fan fan, uvec4 marks) {
     return left;
 }
 
-// Whether a ray passes all boundaries. level: of the cells of the pyramid to begin with; where a ray
-// ended is a fair guess for the next one.
-bool passes(Fan fan, uint index, vec2 place, vec4 course, uvec4 left, uvec4 clear, inout int level) {
+// Boundaries up to one, none below 0.
+uvec4 up_to(int k) {
+    ivec4 count = clamp(k + 1 - ivec4(0, 32, 64, 96), 0, 32);
+    uvec4 part = (uvec4(1u) << (count & 31)) - 1u;
+    return mix(part, uvec4(0xFFFFFFFFu), equal(count, ivec4(32)));
+}
+
+// Whether a ray passes all boundaries. `own`: in the receiver's view; else what of the ray lies in
+// another one is looked at. level: of the cells of the pyramid to begin with; where a ray ended is a
+// fair guess for the next one.
+bool passes(Fan fan, bool own, uint index, vec2 place, uvec4 left, uvec4 clear, inout int level) {
+    vec4 course = fan.middle + place.x * fan.along_x + place.y * fan.along_y;
     float size = float(params.counts.y);
     int top = textureQueryLevels(boundaries) - 1;
     float place_z = 1.0 / fan.s - course.z;
@@ -277,19 +290,30 @@ bool passes(Fan fan, uint index, vec2 place, vec4 course, uvec4 left, uvec4 clea
         // The additive recurrence of the plastic number (Roberts 2018).
         start += fract(vec2(0.75487766, 0.56984029) * float(index) + 0.5) - 0.5;
     }
-    // A light may reach among the boundaries: those behind its place cannot hide it.
+    // A light may reach among the boundaries: those behind its place cannot hide it. In another view
+    // the receiver may be behind, and the light deeper.
     bool among = LIGHT_SHAPE != LIGHT_SUN && place_z > 0.0;
-    float end = among ? floor(place_of(fan.places, 1.0 / place_z)) + 1.0 : 0.0;
-    int least = int(clamp(end, 0.0, 128.0));
+    float place_s = among ? 1.0 / place_z : 1.0e30;
+    float receiver_s = own || fan.s > 0.0 ? fan.s : 1.0e30;
+    float near = own ? place_s : max(place_s, receiver_s);
+    int least = near < 1.0e30 ? int(clamp(floor(place_of(fan.places, near)) + 1.0, 0.0, 128.0)) : 0;
+    if (!own) {
+        vec2 side = fan.s - start * across;
+        vec2 other = fan.s + (size - start) * across;
+        vec2 enters = min(side, other);
+        float enter = max(min(place_s, receiver_s), max(enters.x, enters.y));
+        left &= up_to(int(clamp(floor(place_of(fan.places, enter)), -1.0, 127.0)));
+        left = enter < 1.0e30 ? left : uvec4(0u);
+    }
     bool open = true;
-    bool found = course.z > 0.0;
+    bool found = !own || course.z > 0.0;
     while (found) {
         // Search for a mark on the ray's way.
         found = false;
         ivec2 cell = ivec2(0);
         int k = highest(left);
         while (!found && left != uvec4(0u) && k >= least) {
-            float s = boundary_s(fan, k);
+            float s = own ? boundary_s(fan, k) : s_of(fan.places, float(k));
             vec2 at = floor(start + slope * (s - fan.s));
             bool inside = all(equal(at, clamp(at, 0.0, size - 1.0)));
             cell = ivec2(at) >> level;
@@ -318,23 +342,112 @@ bool passes(Fan fan, uint index, vec2 place, vec4 course, uvec4 left, uvec4 clea
     return open;
 }
 
+// Boundaries of another view that rays may be blocked at once they have left the receiver's.
+uvec4 beyond(Fan fan, uint index) {
+    if (LIGHT_SHAPE == LIGHT_SUN || int(index * words_of(params.options)) == fan.layer) {
+        return uvec4(0u);
+    }
+    // The first ray leaves here; from there on rays come no farther from the light's centre.
+    vec2 room = min(fan.start / max(-fan.low, 1.0e-30),
+        (float(params.counts.y) - fan.start) / max(fan.high, 1.0e-30));
+    float s = fan.s + max(min(room.x, room.y), 0.0);
+    float reach = max(view.light.axis_x.w, view.light.axis_y.w) * 1.42;
+    float farthest = max(FARTHEST_BY_DEPTH / s, reach);
+    uvec4 marks = uvec4(0u);
+    int top = textureQueryLevels(boundaries) - 1;
+    for (uint word = 0u; word < words_of(params.options); ++word) {
+        int layer = int(index * words_of(params.options) + word);
+        marks[word] = texelFetch(boundaries, ivec3(0, 0, layer), top).x;
+    }
+    float place = place_of(params.places[index], 1.0 / farthest);
+    return marks & up_to(int(clamp(place + 1.0, 0.0, 127.0)));
+}
+
+// The light along the axes of the scene, metres; of a sun directions.
+struct PlacedLight {
+    vec3 center; // from the views' origin
+    vec3 axis_x;
+    vec3 axis_y;
+};
+
+// q, n: the receiver from the views' origin along the axes of the scene, and its normal.
+Fan fan_in(uint index, vec3 q, vec3 n, PlacedLight placed) {
+    LightView light_view = params.views[index];
+    vec3 position = in_view(light_view, q);
+    // Beside another view's origin there is no depth to divide by.
+    float least = 1.0e-4 * length(position);
+    bool beside = LIGHT_SHAPE != LIGHT_SUN && abs(position.z) < least;
+    position.z = beside ? (position.z < 0.0 ? -least : least) : position.z;
+    return fan_of(index, position, in_view(light_view, n),
+        in_view(light_view, placed.center), in_view(light_view, placed.axis_x),
+        in_view(light_view, placed.axis_y));
+}
+
 // The part of the light that is seen, of that above the receiver's plane.
-float traced(Fan fan) {
+float traced(Fan fan, vec3 q, vec3 n, PlacedLight placed) {
     uvec4 clear;
     uvec4 marks = reached(fan, clear);
     marks = (marks & clear) | not_free(fan, marks & ~clear);
-    if (marks == uvec4(0u)) {
+    uint others = 0u;
+    float nearest = 0.0; // s of what is nearest to the light in another view
+    for (uint i = 0u; i < params.counts.x; ++i) {
+        uvec4 bits = beyond(fan, i);
+        int word = bits.x != 0u ? 0 : bits.y != 0u ? 1 : bits.z != 0u ? 2 : 3;
+        bool any_mark = bits != uvec4(0u);
+        float place = float(32 * word + findLSB(bits[word])) - 1.001;
+        float s = s_of(params.places[i], max(place, 0.0));
+        others |= any_mark ? 1u << i : 0u;
+        nearest = any_mark ? max(nearest, place > 0.0 ? s : 1.0e30) : nearest;
+    }
+    if (marks == uvec4(0u) && others == 0u) {
         return 1.0;
     }
     float seen = 0.0;
     float above = 0.0;
     int level = 0;
-    for (uint i = 0u; i < params.options.z; ++i) {
-        vec3 ray = ray_of(fan, i);
-        vec4 course = fan.middle + ray.x * fan.along_x + ray.y * fan.along_y;
-        if (course.w > 0.0) {
-            above += ray.z;
-            seen += passes(fan, i, ray.xy, course, marks, clear, level) ? ray.z : 0.0;
+    uint count = params.options.z;
+    for (uint first = 0u; first < count; first += 32u) {
+        uint last = min(first + 32u, count);
+        uint open = 0u;
+        uint leaving = 0u; // those that may come to a mark of another view
+        for (uint i = first; i < last; ++i) {
+            vec3 ray = ray_of(fan, i);
+            vec4 course = fan.middle + ray.x * fan.along_x + ray.y * fan.along_y;
+            bool over = course.w > 0.0;
+            above += over ? ray.z : 0.0;
+            open |= over ? 1u << (i - first) : 0u;
+            vec2 steps = course.z / mix(course.xy, vec2(1.0e-30), lessThan(abs(course.xy), vec2(1.0e-30)));
+            vec2 exits = max(-fan.start * steps, (float(params.counts.y) - fan.start) * steps);
+            bool leaves = fan.s + min(exits.x, exits.y) <= FARTHEST_BY_DEPTH * nearest;
+            leaving |= course.z <= 0.0 || leaves ? 1u << (i - first) : 0u;
+        }
+        Fan turn = fan;
+        uvec4 left = marks;
+        uvec4 known = clear;
+        bool own = true;
+        uint views = others;
+        bool more = true;
+        while (more) {
+            uint waiting = left != uvec4(0u) ? (own ? open : open & leaving) : 0u;
+            while (waiting != 0u) {
+                uint bit = waiting & (~waiting + 1u);
+                waiting ^= bit;
+                uint i = first + uint(findLSB(bit));
+                bool passed = passes(turn, own, i, ray_of(fan, i).xy, left, known, level);
+                open = passed ? open : open ^ bit;
+            }
+            more = views != 0u && (open & leaving) != 0u;
+            if (more) {
+                uint next = uint(findLSB(views));
+                views &= views - 1u;
+                left = beyond(fan, next);
+                turn = fan_in(next, q, n, placed);
+                known = uvec4(0u);
+                own = false;
+            }
+        }
+        for (uint i = first; i < last; ++i) {
+            seen += (open >> (i - first) & 1u) != 0u ? rays[i].z : 0.0;
         }
     }
     return above > 0.0 ? min(seen / above, 1.0) : 1.0;
@@ -391,21 +504,18 @@ float pixel_visibility(uvec2 pixel) {
         }
         if (all(equal(at.xy, clamp(at.xy, 0.0, 1.0)))) {
             LightView light_view = params.views[found];
-            vec3 center;
-            vec3 axis_x;
-            vec3 axis_y;
-            place_light(p, center, axis_x, axis_y);
-            Fan fan = fan_of(found, in_view(light_view, q), in_view(light_view, n),
-                in_view(light_view, center), in_view(light_view, axis_x), in_view(light_view, axis_y));
+            PlacedLight placed;
+            place_light(p, placed.center, placed.axis_x, placed.axis_y);
+            Fan fan = fan_in(found, q, n, placed);
             fan.seed = pixel.y << 16 | pixel.x;
             if ((params.options.w & PIXEL_FOOTPRINT) != 0u) {
                 mat2 spread = pixel_spread(pixel, depth, n, light_view,
-                    in_view(light_view, axis_x).xy, in_view(light_view, axis_y).xy);
+                    in_view(light_view, placed.axis_x).xy, in_view(light_view, placed.axis_y).xy);
                 vec2 texels = light_view.scale.xy * float(params.counts.y);
                 texels *= LIGHT_SHAPE == LIGHT_SUN ? 1.0 : fan.s;
                 fan.spread = mat2(spread[0] * texels, spread[1] * texels);
             }
-            result = above * traced(fan);
+            result = above * traced(fan, q, n, placed);
         }
     }
     return result;

@@ -11,6 +11,9 @@
 //! ray then goes through the pyramid's cells from boundary to boundary: one fetch tests the 32 of a
 //! word that it crosses within a cell.
 //!
+//! Of a light with several views a ray may leave the receiver's before it comes to the light. What of
+//! it lies in the others is then looked at there, where anything is marked so near to the light.
+//!
 //! | pass | makes |
 //! |---|---|
 //! | `params` | views, buckets, rays |

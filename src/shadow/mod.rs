@@ -42,6 +42,8 @@ pub struct ShadowInputs<'f> {
     /// Convex hulls of what the picture can show: all pixels' surfaces lie in one of them. Scene
     /// space, metres.
     pub receivers: Vec<Vec<DVec3>>,
+    /// The same from boxes that turn with the triangles: they grow less around what is turned.
+    pub tight_receivers: Vec<Vec<DVec3>>,
     /// All triangles, which are also all casters.
     pub scene: &'f SceneBuffers,
     /// The scene's resources in this graph.

@@ -60,7 +60,7 @@ pub(super) fn add_passes<'f>(
         .iter()
         .map(|draw| draw.corners)
         .collect();
-    let views = views::sliced_views(&inputs.light, &inputs.receivers, &boxes, &options);
+    let views = views::sliced_views(&inputs.light, &inputs.tight_receivers, &boxes, &options);
     let sliced: Vec<_> = views
         .into_iter()
         .enumerate()

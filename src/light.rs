@@ -169,6 +169,14 @@ impl LightShape {
         }
     }
 
+    /// Distance from the centre to the farthest point, metres; of a sun at distance 1.
+    pub fn reach(&self) -> f32 {
+        match *self {
+            Self::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
+            _ => self.bounding_radius(),
+        }
+    }
+
     /// This shape with every length (or a sun's angle) multiplied by `factor`. Not validated.
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {

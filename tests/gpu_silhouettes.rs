@@ -155,6 +155,7 @@ fn found(scene: &Scene, light: AreaLight, rule: SilhouetteRule) -> Vec<Edge> {
         light_name: "lamp".to_string(),
         light,
         camera: PixelCamera::new(&camera, size),
+        scene_camera: camera.clone(),
         gbuffer,
         tile_bounds,
         view_params: (
@@ -165,7 +166,6 @@ fn found(scene: &Scene, light: AreaLight, rule: SilhouetteRule) -> Vec<Edge> {
             },
         ),
         receivers: Vec::new(),
-        tight_receivers: Vec::new(),
         scene: &buffers,
         ids,
     };

@@ -25,6 +25,7 @@ pub struct FrameRenderer<'s> {
     buffers: SceneBuffers,
     cache: FrameCache,
     kept: Option<KeptMasks>,
+    kept_filled: bool,
 }
 
 impl<'s> FrameRenderer<'s> {
@@ -41,6 +42,7 @@ impl<'s> FrameRenderer<'s> {
                 buffers,
                 cache: FrameCache::new(),
                 kept: None,
+                kept_filled: false,
             }),
             Err(error) => {
                 if let Err(second) = gpu.destroy() {
@@ -126,7 +128,8 @@ impl<'s> FrameRenderer<'s> {
         let start = Instant::now();
         let pipelines = self.gpu.pipelines_created();
         let mut graph = Graph::continuing(self.cache.history());
-        let kept = self.kept.as_ref().filter(|kept| reuse && kept.fit(request));
+        let filled = reuse && self.kept_filled;
+        let kept = (self.kept.as_ref()).filter(|kept| filled && kept.fit(request));
         let masks_kept = kept.map_or(0, |_| lights.len());
         let frame = declare(&mut graph, &self.buffers, request, &lights, kept);
         if reuse && masks_kept == 0 {
@@ -136,6 +139,8 @@ impl<'s> FrameRenderer<'s> {
             let kept = KeptMasks::new(&mut self.gpu, request, &frame.masks)?;
             kept.fill(&mut graph, &frame.masks);
             self.kept = Some(kept);
+            // Until the device has filled them they fit nothing.
+            self.kept_filled = false;
         }
         let wanted = ReadBacks::new(&graph, &frame, request, names)?;
         let aside = Instant::now();
@@ -168,9 +173,7 @@ impl<'s> FrameRenderer<'s> {
             }
         });
         self.gpu.destroy_buffer(target);
-        if result.is_err() {
-            self.forget_kept();
-        }
+        self.kept_filled |= reuse && result.is_ok();
         result
     }
 

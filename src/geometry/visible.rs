@@ -16,8 +16,9 @@ impl HalfSpace {
     }
 }
 
-/// The parts of boxes, given by their corners (x changing fastest, then y), that lie in a camera's frustum (without far plane), as points whose convex
-/// hull holds them; none for a box out of view. Scene space, metres.
+/// The parts of boxes, given by their corners (x changing fastest, then y), that lie in a camera's
+/// frustum (without far plane), as points whose convex hull holds them; none for a box out of view.
+/// Scene space, metres.
 pub fn visible_hulls(
     camera: &SceneCamera,
     size: [u32; 2],

@@ -81,8 +81,6 @@ pub fn add_visibility<'f>(
     let tile_bounds = add_tile_bounds(graph, &gbuffer, size);
     let boxes = scene.draws().iter().map(|draw| draw.bounds.corners());
     let receivers = visible_hulls(camera, size, boxes);
-    let tight = scene.draws().iter().map(|draw| draw.corners);
-    let tight_receivers = visible_hulls(camera, size, tight);
     let mut masks = Vec::with_capacity(lights.len());
     let mut passes = Vec::with_capacity(lights.len());
     for (light, part) in lights.iter().zip(&parts) {
@@ -93,11 +91,11 @@ pub fn add_visibility<'f>(
                 light_name: light.name.clone(),
                 light: light.light,
                 camera: pixels,
+                scene_camera: camera.clone(),
                 gbuffer,
                 tile_bounds,
                 view_params: (params, *part),
                 receivers: receivers.clone(),
-                tight_receivers: tight_receivers.clone(),
                 scene,
                 ids,
             },

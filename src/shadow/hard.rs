@@ -11,10 +11,11 @@
 use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
 use super::map::{MAP_SIZE, ShadowMap, add_maps};
 use super::receivers::add_receivers_in;
+use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask};
 use crate::geometry::{DrawTarget, PixelCamera};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, BufferDesc, Graph, ImageId, PassKind, Stage};
+use crate::graph::{Access, Bind, Graph, ImageId, PassKind, Stage};
 use bytemuck::{Pod, Zeroable};
 
 /// Uniform block of `hard/visibility.comp`.
@@ -62,15 +63,7 @@ pub(super) fn add_hard<'f>(
     };
     params.views[..views.views.len()].copy_from_slice(&views.views);
 
-    let buffer = graph.create_buffer(
-        format!("{technique}.params {name}"),
-        BufferDesc {
-            size: size_of::<HardParams>() as u64,
-        },
-    );
-    let mut pass = graph.pass(format!("{technique}.params {name}"), PassKind::Transfer);
-    let buffer = pass.overwrite(buffer, Access::Clear);
-    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
+    let buffer = add_uniform(graph, format!("{technique}.params {name}"), params);
 
     let maps = add_maps(graph, inputs, technique, &views, DrawTarget::Ids);
     let receivers = add_receivers_in(graph, inputs, technique, 0.0, image);

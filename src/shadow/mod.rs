@@ -14,6 +14,7 @@ pub mod shaft_masks;
 pub mod silhouettes;
 pub mod ssoc;
 mod technique;
+mod uniform;
 
 pub use light_params::{LightParams, ViewParams, shape_number};
 pub use light_view::{LightView, LightViews, light_views};
@@ -23,6 +24,7 @@ pub use technique::{Technique, TechniqueError, TechniqueOption};
 use crate::geometry::{GBuffer, PixelCamera, SceneBuffers, SceneIds};
 use crate::graph::{BufferId, BufferPart, ImageId};
 use crate::light::AreaLight;
+use crate::scene::SceneCamera;
 use glam::DVec3;
 
 /// What a technique is given for one light.
@@ -33,6 +35,8 @@ pub struct ShadowInputs<'f> {
     pub light: AreaLight,
     /// Camera of the picture.
     pub camera: PixelCamera,
+    /// The same, for hulls of what it can see: [`crate::geometry::visible_hulls`].
+    pub scene_camera: SceneCamera,
     /// The surface at each pixel.
     pub gbuffer: GBuffer,
     /// Bounds of the surfaces in each tile: [`crate::geometry::add_tile_bounds`].
@@ -42,8 +46,6 @@ pub struct ShadowInputs<'f> {
     /// Convex hulls of what the picture can show: all pixels' surfaces lie in one of them. Scene
     /// space, metres.
     pub receivers: Vec<Vec<DVec3>>,
-    /// The same from boxes that turn with the triangles: they grow less around what is turned.
-    pub tight_receivers: Vec<Vec<DVec3>>,
     /// All triangles, which are also all casters.
     pub scene: &'f SceneBuffers,
     /// The scene's resources in this graph.

@@ -9,10 +9,11 @@
 use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
 use super::map::{MAP_SIZE, add_maps};
 use super::receivers::add_receivers;
+use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, shape_number};
 use crate::geometry::DrawTarget;
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, BufferDesc, Graph, PassKind, Stage};
+use crate::graph::{Access, Bind, Graph, PassKind, Stage};
 use crate::light::{AreaLight, LightShape};
 use crate::scene::Aabb;
 use bytemuck::{Pod, Zeroable};
@@ -72,7 +73,7 @@ pub(super) fn add_passes<'f>(
     let [width, height] = inputs.camera.size();
     let casters = inputs.scene.bounds();
     let nearest = nearest_blocker(&light, inputs.scene.draws().iter().map(|draw| draw.bounds));
-    let reach = f64::from(reach(&light));
+    let reach = f64::from(light.shape.reach());
     let margin = if light.shape.is_sun() {
         reach * f64::from(casters.radius())
     } else {
@@ -93,11 +94,7 @@ pub(super) fn add_passes<'f>(
         }
     }
 
-    let size = size_of::<PcssParams>() as u64;
-    let buffer = graph.create_buffer(format!("{technique}.params {name}"), BufferDesc { size });
-    let mut pass = graph.pass(format!("{technique}.params {name}"), PassKind::Transfer);
-    let buffer = pass.overwrite(buffer, Access::Clear);
-    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
+    let buffer = add_uniform(graph, format!("{technique}.params {name}"), params);
 
     let map = add_maps(graph, inputs, technique, &views, DrawTarget::Depth).depth;
     let receivers = add_receivers(graph, inputs, technique, reach as f32);
@@ -143,14 +140,6 @@ pub(super) fn add_passes<'f>(
     ShadowMask::new(visibility)
 }
 
-/// Distance from the light's centre to its farthest point, of a sun at distance 1.
-fn reach(light: &AreaLight) -> f32 {
-    match light.shape {
-        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
-        shape => shape.bounding_radius(),
-    }
-}
-
 /// Distance from the light to the nearest box with triangles, but not nearer than the light's own
 /// size: a blocker there covers the light from everywhere that the search could tell apart.
 pub(super) fn nearest_blocker(light: &AreaLight, boxes: impl Iterator<Item = Aabb>) -> f64 {
@@ -170,7 +159,7 @@ fn half_axes(light: &AreaLight, view: &LightView) -> [f32; 4] {
         LightShape::Point => ([0.0; 2], [0.0; 2]),
         // Facing the receiver.
         LightShape::Sphere { radius } => ([radius, 0.0], [0.0, radius]),
-        LightShape::Sun { .. } => ([reach(light), 0.0], [0.0, reach(light)]),
+        LightShape::Sun { .. } => ([light.shape.reach(), 0.0], [0.0, light.shape.reach()]),
         LightShape::Disk { radius } => (along(light.axis_x * radius), along(light.axis_y * radius)),
         LightShape::Rect { width, height } => (
             along(light.axis_x * (0.5 * width)),

@@ -50,6 +50,22 @@ pub struct TechniqueOption {
     pub what: &'static str,
 }
 
+impl TechniqueOption {
+    pub(super) const fn new(
+        name: &'static str,
+        default: &'static str,
+        values: &'static str,
+        what: &'static str,
+    ) -> Self {
+        Self {
+            name,
+            default,
+            values,
+            what,
+        }
+    }
+}
+
 /// Why a text names no technique.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

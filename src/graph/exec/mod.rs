@@ -1,6 +1,7 @@
 //! From a plan to commands: the only part of the graph that sees a device.
 
 mod context;
+mod copies;
 mod resources;
 
 pub use context::{Bind, PassContext};

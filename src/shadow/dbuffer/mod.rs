@@ -31,9 +31,10 @@ pub use options::DbufferOptions;
 use super::receivers::add_receivers;
 use super::shaft_masks::add_shafts;
 use super::silhouettes::{SilhouetteRule, add_silhouettes};
+use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, hard, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageId, PassKind, Stage};
+use crate::graph::{Access, Bind, Graph, ImageId, PassKind, Stage};
 use crate::light::{LightShape, ShapeKind};
 use bytemuck::{Pod, Zeroable};
 use lists::{Lists, Sizes};
@@ -85,9 +86,13 @@ pub(super) fn add_passes<'f>(
         samples: samples::texels(options.samples, matches!(shape, LightShape::Rect { .. })),
         sizes: [sizes.blocks, sizes.lists, 0, 0],
     };
-    let params = add_params(graph, inputs, params);
+    let params = add_uniform(
+        graph,
+        format!("{NAME}.params {}", inputs.light_name),
+        params,
+    );
     let silhouettes = add_silhouettes(graph, inputs, NAME, SilhouetteRule::WholeLight, 1);
-    let receivers = add_receivers(graph, inputs, NAME, reach(&shape));
+    let receivers = add_receivers(graph, inputs, NAME, shape.reach());
     let (shafts, _) = add_shafts(graph, inputs, (NAME, 1), params, &receivers);
     let tools = Lists {
         params,
@@ -99,24 +104,6 @@ pub(super) fn add_passes<'f>(
     };
     let (found, visibility) = tools.add(graph, inputs);
     add_visibility(graph, inputs, &options, &tools, &found, visibility)
-}
-
-/// Distance from the light's centre to its farthest point, metres; of a sun at distance 1.
-fn reach(shape: &LightShape) -> f32 {
-    match shape {
-        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
-        shape => shape.bounding_radius(),
-    }
-}
-
-fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: DbufferParams) -> BufferId {
-    let name = &inputs.light_name;
-    let size = size_of::<DbufferParams>() as u64;
-    let buffer = graph.create_buffer(format!("{NAME}.params {name}"), BufferDesc { size });
-    let mut pass = graph.pass(format!("{NAME}.params {name}"), PassKind::Transfer);
-    let buffer = pass.overwrite(buffer, Access::Clear);
-    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
-    buffer
 }
 
 fn add_visibility<'f>(

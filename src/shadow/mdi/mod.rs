@@ -67,7 +67,7 @@ fn add_visibility<'f>(
 ) -> ShadowMask {
     let name = &inputs.light_name;
     let light = inputs.light;
-    let receivers = add_receivers(graph, inputs, NAME, views::reach(&light));
+    let receivers = add_receivers(graph, inputs, NAME, light.shape.reach());
     let list = receivers.list;
     let gbuffer = inputs.gbuffer;
     let layers = *layers;

@@ -64,45 +64,45 @@ impl MdiOptions {
 
     /// What can be set.
     pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
-        option(
+        TechniqueOption::new(
             "resolution",
             "auto",
             "64 to 2048, a power of two, or auto (4 times the picture's longer side, 256 to 1024)",
             "texels across and down each view's image",
         ),
-        option("buckets", "64", "32, 64 or 128", "depth buckets"),
-        option(
+        TechniqueOption::new("buckets", "64", "32, 64 or 128", "depth buckets"),
+        TechniqueOption::new(
             "spacing",
             "reciprocal",
             "uniform or reciprocal (uniform in 1 / depth, but not thinner than a part of the thickest)",
             "how buckets lie in the casters' depth range",
         ),
-        option(
+        TechniqueOption::new(
             "marks",
             "nearest",
             "nearest or both",
             "ends of a bucket where its surfaces block rays",
         ),
-        option("rays", "64", "4 to 256", "rays a pixel"),
-        option(
+        TechniqueOption::new("rays", "64", "4 to 256", "rays a pixel"),
+        TechniqueOption::new(
             "pattern",
             "fan",
             "fan or random (other places for each pixel)",
             "places on the light that rays go to",
         ),
-        option(
+        TechniqueOption::new(
             "footprint",
             "point",
             "point or pixel (over what the pixel shows, antialiased)",
             "places of the surface that rays begin at",
         ),
-        option(
+        TechniqueOption::new(
             "lookup",
             "dithered",
             "dithered (up to half a texel aside, other for each ray) or nearest",
             "texels that rays look up",
         ),
-        option(
+        TechniqueOption::new(
             "depths",
             "8",
             "1 to 64",
@@ -196,19 +196,5 @@ impl MdiOptions {
     /// Words of a texel's mask.
     pub(super) fn words(&self) -> u32 {
         self.buckets / 32
-    }
-}
-
-const fn option(
-    name: &'static str,
-    default: &'static str,
-    values: &'static str,
-    what: &'static str,
-) -> TechniqueOption {
-    TechniqueOption {
-        name,
-        default,
-        values,
-        what,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::options::{Buckets, Footprint, MdiOptions};
 use super::rays::{MOST_RAYS, Ray, ray_table};
-use crate::light::{AreaLight, LightShape};
+use crate::light::AreaLight;
 use crate::scene::Aabb;
 use crate::shadow::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
 use bytemuck::{Pod, Zeroable};
@@ -42,14 +42,6 @@ pub(super) struct MdiViews {
     pub capacity: u32,
 }
 
-/// Distance from the light's centre to its farthest point, of a sun at distance 1.
-pub(super) fn reach(light: &AreaLight) -> f32 {
-    match light.shape {
-        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
-        shape => shape.bounding_radius(),
-    }
-}
-
 pub(super) fn mdi_views(
     light: &AreaLight,
     receivers: &[Vec<DVec3>],
@@ -59,7 +51,7 @@ pub(super) fn mdi_views(
 ) -> MdiViews {
     let around = casters.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
     let sun = light.shape.is_sun();
-    let reach = f64::from(reach(light));
+    let reach = f64::from(light.shape.reach());
     let center = light.center.as_dvec3();
     let distance = |b: &Aabb| {
         let nearest = light.center.clamp(b.min, b.max) - light.center;

@@ -33,8 +33,9 @@ pub use options::{Combine, Filter, Fit, OcclusionOptions, Planes, Projection};
 
 use super::receivers::add_receivers;
 use super::{ShadowInputs, ShadowMask};
+use crate::geometry::visible_hulls;
 use crate::graph::{Graph, ImageDesc, PassKind};
-use crate::light::{AreaLight, LightShape, ShapeKind};
+use crate::light::ShapeKind;
 use ash::vk;
 
 /// The technique's name.
@@ -54,13 +55,11 @@ pub(super) fn add_passes<'f>(
     inputs: &ShadowInputs<'f>,
     options: OcclusionOptions,
 ) -> ShadowMask {
-    let boxes: Vec<_> = inputs
-        .scene
-        .draws()
-        .iter()
-        .map(|draw| draw.corners)
-        .collect();
-    let views = views::sliced_views(&inputs.light, &inputs.tight_receivers, &boxes, &options);
+    let boxes: Vec<_> = (inputs.scene.draws().iter().map(|draw| draw.corners)).collect();
+    // Boxes that turn with the triangles grow less around what is turned.
+    let size = inputs.camera.size();
+    let receivers = visible_hulls(&inputs.scene_camera, size, boxes.iter().copied());
+    let views = views::sliced_views(&inputs.light, &receivers, &boxes, &options);
     let sliced: Vec<_> = views
         .into_iter()
         .enumerate()
@@ -70,7 +69,7 @@ pub(super) fn add_passes<'f>(
             (slices, filtered)
         })
         .collect();
-    let receivers = add_receivers(graph, inputs, NAME, reach(&inputs.light));
+    let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.reach());
     let mut mask = receivers.visibility;
     for (index, (slices, filtered)) in sliced.iter().enumerate() {
         mask = visibility::add_visibility(
@@ -99,12 +98,4 @@ fn settled(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> crate::graph::Im
     let image = pass.overwrite(image, crate::graph::Access::Clear);
     pass.record(move |ctx| ctx.clear_image(image, [1.0; 4]));
     image
-}
-
-/// Distance from the light's centre to its farthest point, of a sun at distance 1.
-fn reach(light: &AreaLight) -> f32 {
-    match light.shape {
-        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
-        shape => shape.bounding_radius(),
-    }
 }

@@ -114,63 +114,63 @@ impl OcclusionOptions {
 
     /// What can be set.
     pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
-        option("slices", "32", "4 to 128", "occlusion textures"),
-        option(
+        TechniqueOption::new("slices", "32", "4 to 128", "occlusion textures"),
+        TechniqueOption::new(
             "filter",
             "sat",
             "sat, nbuffers (levels weighed linearly), nbuffers-log or mipmaps",
             "how boxes of a texture are averaged",
         ),
-        option(
+        TechniqueOption::new(
             "combine",
             "cumulative",
             "cumulative (by what each adds), bounded (and no more than passes any one), product, sum, \
              maximum or thin (product, each texture filled into the next)",
             "how textures are combined",
         ),
-        option(
+        TechniqueOption::new(
             "planes",
             "blend",
             "uniform, reciprocal (even in 1/depth) or blend (half and half)",
             "how slices lie in the casters' depth range",
         ),
-        option(
+        TechniqueOption::new(
             "projection",
             "centered",
             "centered (cube faces where wide), offset (behind the light) or orthographic",
             "where the scene is sliced from",
         ),
-        option(
+        TechniqueOption::new(
             "fit",
             "occupied",
             "occupied (cut finer, join what holds something) or range",
             "what depths the slices are spent on",
         ),
-        option(
+        TechniqueOption::new(
             "resolution",
             "auto",
             "64 to 4096, a power of two, or auto (8 times the picture's longer side, 512 to 2048)",
             "texels across the slices",
         ),
-        option(
+        TechniqueOption::new(
             "detail",
             "auto",
             "1, 2, 4, 8 or auto (4, but 2 under kernels below an eighth of the view)",
             "texels of the slices across one of the filtered textures",
         ),
-        option(
+        TechniqueOption::new(
             "depth",
             "middle",
             "middle or lower",
             "where in its slice a texture lies",
         ),
-        option(
+        TechniqueOption::new(
             "contact",
             "8",
             "0 to 64",
             "rays of the test for blockers near the receiver",
         ),
-        option(
+        TechniqueOption::new(
             "show",
             "visibility",
             "visibility or fetches (texture accesses of filters, in 1024ths)",
@@ -332,19 +332,5 @@ impl OcclusionOptions {
     /// 32-bit words that hold a bit for each fine slice.
     pub(super) fn words(&self) -> u32 {
         self.fine_slices().div_ceil(32)
-    }
-}
-
-const fn option(
-    name: &'static str,
-    default: &'static str,
-    values: &'static str,
-    what: &'static str,
-) -> TechniqueOption {
-    TechniqueOption {
-        name,
-        default,
-        values,
-        what,
     }
 }

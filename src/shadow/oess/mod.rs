@@ -34,9 +34,10 @@ pub use options::{Find, MOST_SEGMENTS, OessOptions, Outreach};
 
 use super::light_view::LightView;
 use super::map::add_maps_of_size;
+use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, hard};
 use crate::geometry::DrawTarget;
-use crate::graph::{Access, BufferDesc, BufferId, Graph, PassKind};
+use crate::graph::Graph;
 use crate::light::{AreaLight, LightProfile, LightShape, MAX_PROFILE, ShapeKind};
 use bytemuck::{Pod, Zeroable};
 use views::{LineViews, MOST_SECTORS, line_views};
@@ -96,7 +97,11 @@ pub(super) fn add_passes<'f>(
         views = views_of(segments);
     }
     let params = params_of(&inputs.light, &views, &options, segments, length);
-    let buffer = add_params(graph, inputs, params);
+    let buffer = add_uniform(
+        graph,
+        format!("{NAME}.params {}", inputs.light_name),
+        params,
+    );
     let maps = add_maps_of_size(
         graph,
         inputs,
@@ -187,14 +192,4 @@ fn profile_of(profile: &LightProfile) -> (usize, [[f32; 4]; MAX_PROFILE]) {
         moment += width * width * (i as f64 * (a + 0.5 * rise) + inner);
     }
     (count, cells)
-}
-
-fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: OessParams) -> BufferId {
-    let name = &inputs.light_name;
-    let size = size_of::<OessParams>() as u64;
-    let buffer = graph.create_buffer(format!("{NAME}.params {name}"), BufferDesc { size });
-    let mut pass = graph.pass(format!("{NAME}.params {name}"), PassKind::Transfer);
-    let buffer = pass.overwrite(buffer, Access::Clear);
-    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
-    buffer
 }

@@ -93,49 +93,49 @@ impl OessOptions {
 
     /// What can be set.
     pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
-        option(
+        TechniqueOption::new(
             "resolution",
             "1024",
             "64 to 4096",
             "texels across and down an end's map",
         ),
-        option(
+        TechniqueOption::new(
             "segments",
             "auto",
             "auto (where blockers may hide between the line's ends) or 1 to 8",
             "segments of the line, which share the maps of their ends",
         ),
-        option(
+        TechniqueOption::new(
             "edges",
             "exact",
             "exact (of triangles, in the receiver's plane) or texels",
             "where occluding edges lie",
         ),
-        option(
+        TechniqueOption::new(
             "gaps",
             "1",
             "0 or 1",
             "whether light comes between the blockers nearest to two ends that are seen",
         ),
-        option(
+        TechniqueOption::new(
             "walk",
             "2",
             "0 to 16",
             "steps from the stored surface's occluding edge to the receiver's",
         ),
-        option(
+        TechniqueOption::new(
             "outreach",
             "hull",
             "hull, scan (two of the edges found), search (slow check of scan) or scatter (published)",
             "how occluding edges reach the texels of their penumbrae",
         ),
-        option(
+        TechniqueOption::new(
             "find",
             "both",
             "fold, location (strategy 2), tilt (strategy 1) or both (strategies)",
             "which texels are occluding edges, for outreach=scan, search and scatter",
         ),
-        option(
+        TechniqueOption::new(
             "penumbra",
             "depth",
             "depth or place (published: also receivers behind what the map shows)",
@@ -188,19 +188,5 @@ impl OessOptions {
             _ => return None,
         }
         Some(())
-    }
-}
-
-const fn option(
-    name: &'static str,
-    default: &'static str,
-    values: &'static str,
-    what: &'static str,
-) -> TechniqueOption {
-    TechniqueOption {
-        name,
-        default,
-        values,
-        what,
     }
 }

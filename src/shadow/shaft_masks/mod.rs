@@ -34,13 +34,11 @@ pub use options::ShaftOptions;
 pub use samples::light_samples;
 
 use super::receivers::{Receivers, add_receivers};
+use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, shape_number};
 use crate::geometry::{TILE_SIZE, TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{
-    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
-};
-use crate::light::LightShape;
+use crate::graph::{Access, Bind, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
@@ -171,8 +169,12 @@ pub(super) fn add_passes<'f>(
         params.rows[at] = row.texel();
         params.strips[at] = row.strip_texel(&inputs.light.shape);
     }
-    let buffer = add_params(graph, inputs, params);
-    let receivers = add_receivers(graph, inputs, NAME, reach(&inputs.light.shape));
+    let buffer = add_uniform(
+        graph,
+        format!("{NAME}.params {}", inputs.light_name),
+        params,
+    );
+    let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.reach());
     let (shafts, parts) = add_shafts(graph, inputs, (NAME, PARTS), buffer, &receivers);
     let making = lists::Making {
         params: buffer,
@@ -199,24 +201,6 @@ fn part_list(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, what: &str) -> Ti
     let [across, down] = tile_counts(inputs.camera.size());
     let size = [across * TILE_SIZE, down * TILE_SIZE * PARTS];
     TileList::create(graph, &format!("{NAME}.{what} {}", inputs.light_name), size)
-}
-
-/// Distance from the light's centre to its farthest point, of a sun at distance 1.
-fn reach(shape: &LightShape) -> f32 {
-    match shape {
-        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
-        shape => shape.bounding_radius(),
-    }
-}
-
-fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: ShaftParams) -> BufferId {
-    let name = &inputs.light_name;
-    let size = size_of::<ShaftParams>() as u64;
-    let buffer = graph.create_buffer(format!("{NAME}.params {name}"), BufferDesc { size });
-    let mut pass = graph.pass(format!("{NAME}.params {name}"), PassKind::Transfer);
-    let buffer = pass.overwrite(buffer, Access::Clear);
-    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
-    buffer
 }
 
 /// Declares the pass that finds the shaft of each listed tile. `params`: a uniform buffer of the size

@@ -35,13 +35,14 @@ use super::map::{ShadowMap, add_maps_of_size};
 use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
 use super::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
+use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, shape_number};
 use crate::geometry::DrawTarget;
 use crate::gpu::{ComputePipelineDesc, DepthState, GraphicsPipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
-    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, ImagePart, Load, PassKind, Stage,
+    Access, Bind, BufferId, Graph, ImageDesc, ImageId, ImagePart, Load, PassKind, Stage,
 };
-use crate::light::{AreaLight, LightShape, ShapeKind};
+use crate::light::ShapeKind;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -96,7 +97,7 @@ pub(super) fn add_passes<'f>(
     options: SsocOptions,
 ) -> ShadowMask {
     let light = inputs.light;
-    let reach = reach(&light);
+    let reach = light.shape.reach();
     let casters = inputs.scene.bounds();
     let far = farthest(inputs);
     let boxes = inputs.scene.draws().iter().map(|draw| draw.bounds);
@@ -122,20 +123,16 @@ pub(super) fn add_passes<'f>(
             params.search[0] = (1.0 - view.scale[3]) / view.scale[2];
         }
     }
-    let buffer = add_params(graph, inputs, params);
+    let buffer = add_uniform(
+        graph,
+        format!("{NAME}.params {}", inputs.light_name),
+        params,
+    );
     let target = DrawTarget::Ids;
     let map = add_maps_of_size(graph, inputs, NAME, &views, target, options.resolution);
     let list = add_silhouettes(graph, inputs, NAME, SilhouetteRule::Center, VERTICES);
     let bands = add_bands(graph, inputs, &options, &views, buffer, map.depth, list);
     add_visibility(graph, inputs, &options, buffer, map, bands)
-}
-
-/// Distance from the light's centre to its farthest point, metres; of a sun at distance 1.
-fn reach(light: &AreaLight) -> f32 {
-    match light.shape {
-        LightShape::Sun { angular_diameter } => (0.5 * angular_diameter).tan(),
-        shape => shape.bounding_radius(),
-    }
 }
 
 /// Distance of the farthest receiver from the light's centre; of a sun the depth along its
@@ -149,16 +146,6 @@ fn farthest(inputs: &ShadowInputs<'_>) -> f32 {
         return depths.fold(f64::NEG_INFINITY, f64::max).max(-1.0e30) as f32;
     }
     points.map(|p| p.distance(center)).fold(0.0, f64::max) as f32
-}
-
-fn add_params(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, params: SsocParams) -> BufferId {
-    let name = &inputs.light_name;
-    let size = size_of::<SsocParams>() as u64;
-    let buffer = graph.create_buffer(format!("{NAME}.params {name}"), BufferDesc { size });
-    let mut pass = graph.pass(format!("{NAME}.params {name}"), PassKind::Transfer);
-    let buffer = pass.overwrite(buffer, Access::Clear);
-    pass.record(move |ctx| ctx.update_buffer(buffer, 0, bytemuck::bytes_of(&params)));
-    buffer
 }
 
 /// The distortion maps: R32_UINT, one more than the number of the edge, 0 for none, and its faces'
@@ -247,7 +234,7 @@ fn add_visibility<'f>(
         unreachable!("triangle numbers were asked for");
     };
     let name = &inputs.light_name;
-    let receivers = add_receivers(graph, inputs, NAME, reach(&inputs.light));
+    let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.reach());
     let list = receivers.list;
     let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
     let (view_params, part) = inputs.view_params;

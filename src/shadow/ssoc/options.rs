@@ -58,31 +58,31 @@ impl SsocOptions {
 
     /// What can be set.
     pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
-        option(
+        TechniqueOption::new(
             "resolution",
             "1024",
             "64 to 4096",
             "texels across and down the shadow map",
         ),
-        option(
+        TechniqueOption::new(
             "bands",
             "1024",
             "64 to 4096",
             "texels across and down each distortion map",
         ),
-        option(
+        TechniqueOption::new(
             "lookups",
             "13",
             "1 to 32, of which combine=cells uses all, else 6",
             "places of the distortion maps that a pixel looks at",
         ),
-        option(
+        TechniqueOption::new(
             "combine",
             "cells",
             "cells (each lookup decides a part of the light), rule (by how the edges lie), product (as published), min, and, or",
             "how several edges join",
         ),
-        option(
+        TechniqueOption::new(
             "area",
             "exact",
             "exact or cubic (3 t^2 - 2 t^3, as published)",
@@ -122,19 +122,5 @@ impl SsocOptions {
             _ => return None,
         }
         Some(())
-    }
-}
-
-const fn option(
-    name: &'static str,
-    default: &'static str,
-    values: &'static str,
-    what: &'static str,
-) -> TechniqueOption {
-    TechniqueOption {
-        name,
-        default,
-        values,
-        what,
     }
 }

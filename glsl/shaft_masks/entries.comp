@@ -253,14 +253,16 @@ void main() {
         first_edge = atomicAdd(edges_used, count_sum <= MOST_COUNT ? edges : 0u);
     }
     barrier();
-    // Without room for its edges a tile is looked at as if nothing was known of it.
-    bool fits = count_sum <= MOST_COUNT && first_edge + edges <= params.pattern.z;
+    // Without room for its edges a tile is looked at as if nothing was known of it. So is one whose list
+    // ends early: an edge between a triangle in the list and one that found no room in it counts for neither.
+    bool fits = candidates.z == params.counts.z && count_sum <= MOST_COUNT
+        && first_edge + edges <= params.pattern.z;
     for (uint i = lane; i < edges && fits; i += gl_WorkGroupSize.x) {
         imageStore(edge_pool, triangle_texel_place(first_edge + i), uvec4(staged[i]));
     }
     uint whole = fits ? whole_count : 0u;
     uint others = fits ? other_count : 0u;
-    uint resume = fits ? candidates.z : 0u;
+    uint resume = fits ? params.counts.z : 0u;
     bool dark = is_dark != 0u;
     vec2 depths = fetch_part_depths(part);
     bool partly = resume < params.counts.z && !dark;

@@ -1,10 +1,13 @@
-.PHONY: help demo test bench bench-check bench-plan bench-batch slurm-test cluster-check clean-deps
+.PHONY: help demo test bench bench-check bench-plan bench-batch study studies slurm-test cluster-check clean-deps
 
 # For make bench: scenes, what is held against each other, picture size, and where it goes.
 SCENES ?= assets
 TECHNIQUES ?= all
 SIZE ?= 512x512
 OUT ?= out/bench
+# For make study: name of a file in benches/studies/, and further options such as --repeat 3.
+STUDY ?= occlusion-textures
+STUDY_OPTIONS ?= --resume
 # The strongest ray tracer, where its library is: asked by the shell, after set-up may have installed it.
 EMBREE = $$([ -f /usr/include/embree3/rtcore.h ] || [ -f /usr/local/include/embree3/rtcore.h ] && echo --features embree)
 
@@ -17,6 +20,8 @@ help:
 	@echo "make test        set up this machine, then run every check and test"
 	@echo "make bench       run time against error of all techniques over all scenes, to out/bench/"
 	@echo "make bench-check look at out/bench/report.html in headless Chromium"
+	@echo "make study       the tables of one file of benches/studies/, to out/studies/: STUDY=name"
+	@echo "make studies     the tables of all"
 	@echo "make bench-plan  criterion benchmarks of the render graph"
 	@echo "make bench-batch throughput of a batch against a process for each item"
 	@echo "make slurm-test  32 tasks of a real Slurm on this machine against one process; needs root"
@@ -42,6 +47,14 @@ bench:
 
 bench-check:
 	scripts/report_browser.py $(OUT)/report.html $(OUT)/screenshots
+
+study:
+	scripts/setup.sh bench
+	cargo build --release $(EMBREE)
+	$(BIN) bench --study benches/studies/$(STUDY).toml --out out/studies/$(STUDY) $(STUDY_OPTIONS)
+
+studies:
+	for study in $(basename $(notdir $(wildcard benches/studies/*.toml))); do $(MAKE) study STUDY=$$study || exit 1; done
 
 bench-plan:
 	scripts/setup.sh demo

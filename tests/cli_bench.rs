@@ -135,6 +135,131 @@ fn a_small_benchmark_has_results_and_a_page() -> Result {
     Ok(())
 }
 
+const STUDY: &str = r#"
+title = "Small"
+[[table]]
+name = "scales"
+title = "By light size"
+reproduces = "nothing"
+scenes = ["SPHERE"]
+light-scales = [1, 3]
+sizes = ["32x32"]
+techniques = ["pcss:taps=8"]
+rivals = ["rays:2"]
+samples = 16
+columns = ["rmse", "ratio", "passes:pcss.map* as map ms", "penumbra_pixels"]
+"#;
+
+/// Measures [`STUDY`] with more or other text in it.
+fn study(folder: &Path, text: &str, more: &[&str]) -> std::io::Result<Output> {
+    fs::write(folder.join("study.toml"), text.replace("SPHERE", SPHERE))?;
+    let mut args = vec!["--study", "study.toml", "--out", "out", "--repeat", "1"];
+    args.extend(more);
+    bench(folder, &args)
+}
+
+#[test]
+fn a_study_has_tables_and_goes_on_where_it_was() -> Result {
+    let folder = tempfile::tempdir()?;
+    let folder = folder.path();
+    let output = study(folder, STUDY, &[])?;
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!((output.status.code(), stderr.as_str()), (Some(0), ""));
+    let page = fs::read_to_string(folder.join("out/study.md"))?;
+    let rows = |page: &str| -> Vec<Vec<String>> {
+        let lines = page.lines().filter(|line| line.starts_with('|'));
+        let cells = |line: &str| line.split('|').map(|cell| cell.trim().into()).collect();
+        lines.map(cells).collect()
+    };
+    let rows = rows(&page);
+    let heads = [
+        "",
+        "light \u{d7}",
+        "technique",
+        "rmse",
+        "ratio",
+        "map ms",
+        "penumbra_pixels",
+        "",
+    ];
+    assert_eq!(rows[0], heads, "{page}");
+    let wanted = [
+        ("1", "`pcss:taps=8`"),
+        ("1", "`rays:2`"),
+        ("3", "`pcss:taps=8`"),
+        ("3", "`rays:2`"),
+    ];
+    assert_eq!(rows.len(), 2 + wanted.len(), "{page}");
+    for (row, (scale, label)) in rows[2..].iter().zip(wanted) {
+        assert_eq!((row[1].as_str(), row[2].as_str()), (scale, label));
+        assert!(
+            row[3]
+                .parse::<f64>()
+                .is_ok_and(|rmse| rmse > 0.001 && rmse < 0.7),
+            "{page}"
+        );
+        // `hard` is measured without a row; rays have neither frames nor passes.
+        let is_number = |cell: &String| cell.parse::<f64>().is_ok_and(|number| number > 0.0);
+        assert_eq!(is_number(&row[4]), label.contains("pcss"), "{page}");
+        assert_eq!(is_number(&row[5]), label.contains("pcss"), "{page}");
+    }
+    // A larger light casts wider penumbrae.
+    let pixels = |row: usize| rows[row][6].parse::<u32>().unwrap_or(0);
+    assert!(pixels(4) > pixels(2) && pixels(2) > 0, "{page}");
+
+    let file = folder.join("out/scales/32x32-light-3/results.json");
+    let found: Value = serde_json::from_slice(&fs::read(&file)?)?;
+    assert_eq!(found["settings"]["light_scale"], 3.0);
+    assert!(file.with_file_name("report.html").exists());
+    // All is done: times stay what they were.
+    let output = study(folder, STUDY, &["--resume"])?;
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(fs::read_to_string(folder.join("out/study.md"))?, page);
+    Ok(())
+}
+
+#[test]
+fn a_wrong_study_is_refused_in_one_line() -> Result {
+    let folder = tempfile::tempdir()?;
+    let folder = folder.path();
+    for (from, to, code, part) in [
+        (
+            "sizes",
+            "size",
+            2,
+            "study.toml: line 9: unknown field `size`",
+        ),
+        (
+            "pcss:taps=8",
+            "soft",
+            2,
+            "line 10: unknown technique `soft`",
+        ),
+        ("\"rmse\"", "\"speed\"", 2, "no column `speed`"),
+        ("[1, 3]", "[]", 2, "table `scales`: `light-scales` is empty"),
+        (
+            "samples",
+            "light = \"sun\"\nsamples",
+            2,
+            "has no light `sun`; it has ",
+        ),
+        ("SPHERE", "none.glb", 1, "none.glb"),
+    ] {
+        let output = study(folder, &STUDY.replace(from, to), &[])?;
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{part}: {stderr}");
+        assert!(
+            stderr.starts_with("error: ") && stderr.lines().count() == 1,
+            "{stderr}"
+        );
+        assert!(stderr.contains(part), "{part}: {stderr}");
+        assert!(!folder.join("out").exists(), "{part}");
+    }
+    let output = study(folder, STUDY, &["--techniques", "hard"])?;
+    assert_eq!(output.status.code(), Some(2));
+    Ok(())
+}
+
 #[test]
 fn a_technique_without_a_device_fails_alone() -> Result {
     let folder = tempfile::tempdir()?;

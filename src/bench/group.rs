@@ -15,7 +15,8 @@ use super::rival::{Engine, Rival};
 use crate::capture::FrameRequest;
 use crate::capture::output::{Output, OutputError};
 use crate::gpu::Gpu;
-use crate::measure::measure;
+use crate::light::{LightOverrides, LightScale};
+use crate::measure::{PENUMBRA, measure};
 use crate::message::line;
 use crate::reference::{Cache, Reference, ReferenceError, Sampling, Settings, Truth};
 use crate::scene::{LoadOptions, Scene, SceneCamera, SceneError, SceneLight};
@@ -32,6 +33,8 @@ pub struct Job {
     pub light: usize,
     /// The light's name, for messages.
     pub light_name: String,
+    /// Factor on its size, 1e-6 to 1e6.
+    pub light_scale: f32,
     /// Camera by name or index; the first one by default.
     pub camera: Option<String>,
     /// Labels of the contenders.
@@ -166,8 +169,15 @@ fn open(job: &Job) -> Result<(Scene, SceneCamera), GroupError> {
         let found = found.ok_or(GroupError::NoCase { case })?;
         return Ok((found.scene, found.camera));
     }
-    let scene = Scene::load(&job.scene, &LoadOptions::default())?;
+    let mut scene = Scene::load(&job.scene, &LoadOptions::default())?;
     let camera = scene.select_camera(job.camera.as_deref())?;
+    if job.light_scale != 1.0 && job.light < scene.lights.len() {
+        let overrides = LightOverrides {
+            scale: Some(LightScale(job.light_scale)),
+            ..LightOverrides::default()
+        };
+        scene.override_lights(&overrides, Some(job.light))?;
+    }
     Ok((scene, camera))
 }
 
@@ -325,7 +335,10 @@ fn entry(
     }
     entry.identical = Some(cell.identical);
     match measure(&cell.visibility, &truth.visibility, &truth.valid) {
-        Ok(measures) => entry.error = Some(measures),
+        Ok(measures) => {
+            entry.error = Some(measures);
+            entry.penumbra_mean = penumbra_mean(&cell.visibility, truth);
+        }
         // An earlier failure says more.
         Err(error) => {
             entry.failure.get_or_insert(Failure {
@@ -340,6 +353,19 @@ fn entry(
         entry.image = Some(image);
     }
     Ok(entry)
+}
+
+/// Over the valid pixels that are penumbra in truth.
+fn penumbra_mean(visibility: &[f32], truth: &Truth) -> Option<f64> {
+    let all = visibility.iter().zip(&truth.visibility).zip(&truth.valid);
+    let (mut sum, mut count) = (0.0, 0_u64);
+    for ((&value, wanted), &valid) in all {
+        if valid && *wanted > PENUMBRA.start && *wanted < PENUMBRA.end {
+            sum += f64::from(value);
+            count += 1;
+        }
+    }
+    (count > 0).then(|| sum / count as f64)
 }
 
 /// An entry of which nothing was measured.
@@ -367,6 +393,7 @@ pub(super) fn blank_entry(job: &Job, contender: &Contender) -> Entry {
         identical: None,
         samples: job.samples,
         error: None,
+        penumbra_mean: None,
         failure: None,
         image: None,
     }

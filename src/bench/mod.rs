@@ -2,7 +2,8 @@
 //!
 //! One [`Job`] is one scene under one light, with all contenders. [`group::run`] casts the truth
 //! and measures the cells in turn; [`session::Session`] goes through all jobs, keeps what is done
-//! and survives jobs that die; [`report`] turns the [`Results`] into a page.
+//! and survives jobs that die; [`report`] turns the [`Results`] into a page. A [`study`] is a file of
+//! tables, each with benchmarks of its own.
 //!
 //! # `results.json`, schema 1
 //!
@@ -12,7 +13,7 @@
 //! | `program` | name and version |
 //! | `machine` | `cpu`, `threads`, `os` |
 //! | `driver` | Vulkan device and driver; `null` if no technique ran |
-//! | `settings` | `techniques` (labels in order), `width`, `height`, `repeat`, `samples`, `cell_seconds`, `device` |
+//! | `settings` | `techniques` (labels in order), `width`, `height`, `repeat`, `samples`, `cell_seconds`, `device`, `light_scale` (factor on the lights' sizes) |
 //! | `references` | one entry a scene and light: `scene`, `light`, `light_index`, `light_shape`, `width`, `height`, `samples`, `standard_error` (`rms`, `max` over partly lit pixels), `valid_pixels`, `penumbra_pixels`, `rays`, `cast_ms` (`null` if kept from an earlier run), `image`, `valid_image` (files beside `results.json`, 8-bit grey) |
 //! | `images` | one entry a cell: [`Entry`], the fields of `capture`'s report and more |
 //! | `failures` | the cells without a result once more: `scene`, `light`, `light_index`, `label`, `kind` (`unsupported`, `failed` or `crashed`), `reason` |
@@ -32,6 +33,7 @@ pub mod report;
 pub mod results;
 pub mod rival;
 pub mod session;
+pub mod study;
 
 mod cell;
 
@@ -39,3 +41,4 @@ pub use contender::{Contender, ContenderError, parse_list};
 pub use group::{GroupError, GroupResult, Job};
 pub use results::{Entry, Failure, FailureKind, Results, ResultsError, Spread};
 pub use session::{Outcome, Session};
+pub use study::{Study, StudyError};

@@ -54,6 +54,13 @@ pub struct Settings {
     pub cell_seconds: f64,
     /// The Vulkan device asked for.
     pub device: Option<String>,
+    /// Factor on the lights' sizes.
+    #[serde(default = "one")]
+    pub light_scale: f32,
+}
+
+fn one() -> f32 {
+    1.0
 }
 
 /// The truth for one scene and light.
@@ -136,6 +143,9 @@ pub struct Entry {
     pub samples: u32,
     /// Against the truth.
     pub error: Option<Measures>,
+    /// Mean visibility over the valid penumbra pixels of the truth; `None` if there are none.
+    #[serde(default)]
+    pub penumbra_mean: Option<f64>,
     /// Why the cell has no result.
     pub failure: Option<Failure>,
     /// Visibility as a file beside `results.json`.

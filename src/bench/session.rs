@@ -207,6 +207,11 @@ pub(super) fn difference(kept: &Settings, asked: &Settings) -> Option<String> {
             format!("{:?}", kept.device),
             format!("{:?}", asked.device),
         ),
+        (
+            "light scale",
+            kept.light_scale.to_string(),
+            asked.light_scale.to_string(),
+        ),
     ];
     let differing = pairs.into_iter().find(|(_, kept, asked)| kept != asked);
     differing.map(|(what, kept, asked)| format!("{what} {kept}, not {asked}"))
@@ -226,6 +231,7 @@ mod tests {
             samples: 16,
             cell_seconds: 1.0,
             device: None,
+            light_scale: 1.0,
         }
     }
 
@@ -235,6 +241,7 @@ mod tests {
             case: None,
             light: 0,
             light_name: "lamp".into(),
+            light_scale: 1.0,
             camera: None,
             contenders: settings().techniques,
             size: [8, 8],

@@ -1,14 +1,10 @@
 //! `antumbra bench`: run time against error, over scenes and techniques.
 //!
-//! Each scene and light is measured in a process of its own, this program with the hidden
-//! `--worker`. It reads its job from standard input and prints lines: `step LABEL` before it
-//! touches a cell, at last `result JSON` or `failed TEXT`. It ends when its standard input closes,
-//! so that it never outlives its parent.
+//! Each scene and light is measured in a process of its own ([`bench_worker`]).
 
 use std::fmt::Write as _;
-use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
 
 use clap::{Args, value_parser};
 use serde_json::{Value, json};
@@ -17,14 +13,13 @@ use super::args::Size;
 use super::error::CliError;
 use super::progress::Progress;
 use super::shard::{self, ShardArgs};
-use super::{pipeline_cache, print_text};
+use super::{bench_study, bench_worker, print_text};
 use crate::batch::scene_file::scenes_in;
 use crate::batch::{Cost, SceneFacts, Shard, bench_cost, run_of};
 use crate::bench::contender::Method;
 use crate::bench::results::{FailureKind, Results, ResultsError, Settings};
-use crate::bench::{Contender, GroupResult, Job, Outcome, Session, group, parse_list, report};
+use crate::bench::{Contender, Job, Outcome, Session, StudyError, group, parse_list, report};
 use crate::capture::output::Output;
-use crate::gpu::Gpu;
 use crate::reference::MAX_SAMPLES;
 use crate::stress;
 
@@ -34,6 +29,7 @@ Examples:
   antumbra bench assets --techniques hard,pcss,rays:16 --size 256x256 --out results
   antumbra bench a.glb b.glb --techniques 'pcss:taps=16,search=8;pcss:taps=64' --out results
   antumbra bench assets --out results --resume
+  antumbra bench --study benches/studies/occlusion-textures.toml --out results
 
 Techniques are those of `antumbra techniques`, and CPU ray tracing on all cores as a rival: rays:N
 with N rays a pixel, rays:N+M with M more where a 3x3 neighbourhood disagrees. They are separated by
@@ -43,14 +39,21 @@ the technique before it.
 Every light of every scene is measured, each in a process of its own, all techniques in turn. A
 technique that fails or crashes is recorded in the results and the rest goes on; the exit code is
 then 1 at the end. DIR/results.json has all numbers, DIR/report.html shows them; the page needs
-nothing else.";
+nothing else.
+
+A study is a TOML file of tables: scenes, techniques, light scales, sizes and columns of each. Its
+tables go to DIR/study.md, the benchmarks that they are made of to DIR/TABLE/SIZE. --size, --samples,
+--repeat and --cell-seconds hold for all tables then.";
+
+const DEFAULT_SIZE: [u32; 2] = [512, 512];
+const DEFAULT_SAMPLES: u32 = 1024;
 
 /// Measure run time against error over scenes and techniques
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct BenchArgs {
     /// Scenes, glTF 2.0 files, or folders of them
-    #[arg(value_name = "SCENE", required_unless_present_any = ["suite", "worker"])]
+    #[arg(value_name = "SCENE", required_unless_present_any = ["suite", "study", "worker"])]
     scenes: Vec<PathBuf>,
 
     /// Techniques with their options and rivals, or all
@@ -61,9 +64,16 @@ pub(super) struct BenchArgs {
     #[arg(long, value_name = "NAME")]
     suite: Option<Suite>,
 
-    /// Picture size in pixels
-    #[arg(long, value_name = "WxH", default_value = "512x512")]
-    size: Size,
+    /// Measure the tables of a TOML file instead
+    #[arg(
+        long, value_name = "FILE",
+        conflicts_with_all = ["scenes", "suite", "techniques", "camera", "shard", "shards"]
+    )]
+    study: Option<PathBuf>,
+
+    /// Picture size in pixels; 512x512 by default
+    #[arg(long, value_name = "WxH")]
+    pub(super) size: Option<Size>,
 
     /// Camera of each scene; the first one by default
     #[arg(long, value_name = "NAME|INDEX")]
@@ -77,12 +87,12 @@ pub(super) struct BenchArgs {
     #[arg(long, value_name = "S", default_value = "20", value_parser = parse_seconds)]
     cell_seconds: f64,
 
-    /// Light samples a pixel of the ray-traced truth
+    /// Light samples a pixel of the ray-traced truth; 1024 by default
     #[arg(
-        long, value_name = "N", default_value = "1024",
+        long, value_name = "N",
         value_parser = value_parser!(u32).range(16..=i64::from(MAX_SAMPLES))
     )]
-    samples: u32,
+    pub(super) samples: Option<u32>,
 
     /// Vulkan device, by part of its name or by its index in `antumbra info`
     #[arg(long, value_name = "NAME|INDEX")]
@@ -90,11 +100,11 @@ pub(super) struct BenchArgs {
 
     /// Folder for results.json, report.html and images; made if it is not there
     #[arg(long, value_name = "DIR", required_unless_present = "worker")]
-    out: Option<PathBuf>,
+    pub(super) out: Option<PathBuf>,
 
     /// Keep what is finished in DIR/results.json and measure the rest
     #[arg(long)]
-    resume: bool,
+    pub(super) resume: bool,
 
     #[command(flatten)]
     shard: ShardArgs,
@@ -126,7 +136,7 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 
 /// What ends a benchmark.
 #[derive(Debug, thiserror::Error)]
-enum BenchError {
+pub(super) enum BenchError {
     #[error("{}: cannot make the folder: {source}", path.display())]
     Create { path: PathBuf, source: io::Error },
     #[error("cannot start the program for a measurement: {0}")]
@@ -135,6 +145,16 @@ enum BenchError {
     Job(String),
     #[error(transparent)]
     Results(#[from] ResultsError),
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    #[error("{}: table `{table}`: {scene} has no light `{light}`; it has {have}", path.display())]
+    NoLight {
+        path: PathBuf,
+        table: String,
+        scene: String,
+        light: String,
+        have: String,
+    },
     #[error("{failed} of {all} cells failed, the first: {first}; all are in {}", file.display())]
     Cells {
         failed: usize,
@@ -147,7 +167,12 @@ enum BenchError {
 impl From<BenchError> for CliError {
     fn from(error: BenchError) -> Self {
         match error {
-            BenchError::Results(ResultsError::Settings { .. }) => Self::Usage(error.to_string()),
+            BenchError::Results(ResultsError::Settings { .. }) | BenchError::NoLight { .. } => {
+                Self::Usage(error.to_string())
+            }
+            BenchError::Study(StudyError::Form { .. } | StudyError::Table { .. }) => {
+                Self::Usage(error.to_string())
+            }
             error => Self::Other(Box::new(error)),
         }
     }
@@ -155,7 +180,10 @@ impl From<BenchError> for CliError {
 
 pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     if args.worker {
-        return work();
+        return bench_worker::work();
+    }
+    if let Some(file) = &args.study {
+        return bench_study::run(args, file);
     }
     let contenders = parse_list(&args.techniques.join(";"));
     let contenders = contenders.map_err(|error| CliError::Usage(error.to_string()))?;
@@ -163,58 +191,73 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     let out = folder(args, told.as_ref().map(|(shard, _)| *shard));
     // Images of all shards go into one folder: their names tell scenes and lights apart.
     let shared = args.out.clone().unwrap_or_default();
-    let mut jobs = jobs(args, &contenders, &shared)?;
+    let size = args.size.map_or(DEFAULT_SIZE, |size| size.0);
+    let samples = args.samples.unwrap_or(DEFAULT_SAMPLES);
+    let blank = blank_job(args, labels(&contenders), size, samples, 1.0, &shared);
+    let mut jobs = jobs(args, &blank)?;
     let all = groups(&jobs);
     if let Some(told) = &told {
         jobs = jobs[run_of(&costs(args, &contenders, &jobs), told.0)].to_vec();
         print_text(&shard::line(told, jobs.len(), "scenes and lights"))?;
     }
-    let images = shared.join("images");
-    let created = std::fs::create_dir_all(&images);
-    created.map_err(|source| BenchError::Create {
-        path: images,
-        source,
-    })?;
-    let created = std::fs::create_dir_all(&out);
-    created.map_err(|source| BenchError::Create {
-        path: out.clone(),
-        source,
-    })?;
+    create(&shared.join("images"))?;
+    create(&out)?;
     let page = Output::File(out.join("report.html"));
     page.check()?;
     let shard = told.map_or(Shard::WHOLE, |(shard, _)| shard);
     Output::File(out.join("list.json")).write(&contents(shard, &all)?)?;
 
+    let mut session = open(args, &blank, &out)?;
+    measure(&mut session, &jobs, &Progress::new(jobs.len() as u64))?;
+    page.write(report::page(session.results(), &shared).as_bytes())?;
+    print_text(&summary(session.results(), &session.file(), &page))?;
+    judge([session.results()], session.file())
+}
+
+/// Makes a folder and those above it.
+pub(super) fn create(folder: &Path) -> Result<(), BenchError> {
+    std::fs::create_dir_all(folder).map_err(|source| BenchError::Create {
+        path: folder.into(),
+        source,
+    })
+}
+
+/// The results in `out`, or none so far.
+pub(super) fn open(args: &BenchArgs, blank: &Job, out: &Path) -> Result<Session, BenchError> {
     let settings = Settings {
-        techniques: labels(&contenders),
-        width: args.size.0[0],
-        height: args.size.0[1],
-        repeat: args.repeat,
-        samples: args.samples,
-        cell_seconds: args.cell_seconds,
-        device: args.device.clone(),
+        techniques: blank.contenders.clone(),
+        width: blank.size[0],
+        height: blank.size[1],
+        repeat: blank.repeat,
+        samples: blank.samples,
+        cell_seconds: blank.cell_seconds,
+        device: blank.device.clone(),
+        light_scale: blank.light_scale,
     };
-    let mut session = match args.resume {
-        true => Session::resume(&out, settings).map_err(BenchError::from)?,
-        false => Session::new(&out, settings),
-    };
-    let progress = Progress::new(jobs.len() as u64);
+    match args.resume {
+        true => Ok(Session::resume(out, settings)?),
+        false => Ok(Session::new(out, settings)),
+    }
+}
+
+/// Measures what is not done yet.
+pub(super) fn measure(
+    session: &mut Session,
+    jobs: &[Job],
+    progress: &Progress,
+) -> Result<(), BenchError> {
     let mut fault = None;
-    let ran = session.run(&jobs, &mut |job| {
-        run_in_process(job, &progress).unwrap_or_else(|error| {
+    session.run(jobs, &mut |job| {
+        bench_worker::run_in_process(job, progress).unwrap_or_else(|error| {
             let reason = error.to_string();
             fault.get_or_insert(error);
             Outcome::Failed(reason)
         })
-    });
-    drop(progress);
-    ran.map_err(BenchError::from)?;
-    if let Some(fault) = fault {
-        return Err(fault.into());
+    })?;
+    match fault {
+        Some(fault) => Err(fault),
+        None => Ok(()),
     }
-    page.write(report::page(session.results(), &shared).as_bytes())?;
-    print_text(&summary(session.results(), &session.file(), &page))?;
-    judge(session.results(), session.file())
 }
 
 /// `--out`, and in it a folder for each shard of several.
@@ -238,7 +281,7 @@ fn costs(args: &BenchArgs, contenders: &[Contender], jobs: &[Job]) -> Vec<Cost> 
     let costs = jobs.iter().enumerate().map(|(at, job)| {
         // Scenes that are no file are small.
         let facts = SceneFacts::read(&job.scene);
-        let (size, samples, rounds) = (args.size.0, args.samples, args.repeat);
+        let (size, samples, rounds) = (job.size, job.samples, args.repeat);
         bench_cost(facts, size, samples, rounds, &techniques, rivals, at as u32)
     });
     costs.collect()
@@ -264,22 +307,41 @@ fn labels(contenders: &[Contender]) -> Vec<String> {
     contenders.iter().map(|c| c.label.clone()).collect()
 }
 
+/// A job without its scene and light.
+pub(super) fn blank_job(
+    args: &BenchArgs,
+    contenders: Vec<String>,
+    size: [u32; 2],
+    samples: u32,
+    light_scale: f32,
+    out: &Path,
+) -> Job {
+    Job {
+        scene: PathBuf::new(),
+        case: None,
+        light: 0,
+        light_name: String::new(),
+        light_scale,
+        camera: args.camera.clone(),
+        contenders,
+        size,
+        repeat: args.repeat,
+        samples,
+        cell_seconds: args.cell_seconds,
+        device: args.device.clone(),
+        out: out.into(),
+        dead: Vec::new(),
+    }
+}
+
 /// One job for each light of each scene. All scenes are read before the first is measured.
-fn jobs(args: &BenchArgs, contenders: &[Contender], out: &Path) -> Result<Vec<Job>, CliError> {
+fn jobs(args: &BenchArgs, blank: &Job) -> Result<Vec<Job>, CliError> {
     let job = |scene: &Path, case: Option<usize>, light: usize, light_name: String| Job {
         scene: scene.into(),
         case,
         light,
         light_name,
-        camera: args.camera.clone(),
-        contenders: labels(contenders),
-        size: args.size.0,
-        repeat: args.repeat,
-        samples: args.samples,
-        cell_seconds: args.cell_seconds,
-        device: args.device.clone(),
-        out: out.into(),
-        dead: Vec::new(),
+        ..blank.clone()
     };
     let mut jobs: Vec<Job> = Vec::new();
     let assets = matches!(args.suite, Some(Suite::Assets)).then(|| PathBuf::from("assets"));
@@ -301,110 +363,6 @@ fn jobs(args: &BenchArgs, contenders: &[Contender], out: &Path) -> Result<Vec<Jo
         }
     }
     Ok(jobs)
-}
-
-/// Ends the process when it goes out of use.
-struct Worker(Child);
-
-impl Drop for Worker {
-    fn drop(&mut self) {
-        // Neither does anything to a process that has ended.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn run_in_process(job: &Job, progress: &Progress) -> Result<Outcome, BenchError> {
-    let program = std::env::current_exe().map_err(BenchError::Start)?;
-    let text = serde_json::to_string(job).map_err(|error| BenchError::Job(error.to_string()))?;
-    let mut command = Command::new(program);
-    command.args(["bench", "--worker"]);
-    command
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    let mut worker = Worker(command.spawn().map_err(BenchError::Start)?);
-    let (mut stdin, stdout, stderr) = (
-        worker.0.stdin.take(),
-        worker.0.stdout.take(),
-        worker.0.stderr.take(),
-    );
-    let said = std::thread::spawn(move || {
-        let mut said = Vec::new();
-        if let Some(mut stderr) = stderr {
-            // What there is of it will do.
-            let _ = stderr.read_to_end(&mut said);
-        }
-        String::from_utf8_lossy(&said).into_owned()
-    });
-    if let Some(stdin) = &mut stdin {
-        // A worker that does not read has died; its exit tells.
-        let _ = writeln!(stdin, "{text}").and_then(|()| stdin.flush());
-    }
-    let scene = job.scene.display();
-    progress.say(format!("{scene}, {}: truth", job.light_name));
-    let (mut label, mut outcome) = (None, None);
-    let lines = stdout.map(|stdout| BufReader::new(stdout).lines());
-    for line in lines.into_iter().flatten().map_while(Result::ok) {
-        match line.split_once(' ') {
-            Some(("step", rest)) => {
-                progress.say(format!("{scene}, {}: {rest}", job.light_name));
-                label = Some(rest.to_string());
-            }
-            Some(("result", rest)) => {
-                let group = serde_json::from_str::<GroupResult>(rest).ok();
-                outcome = group.map(|group| Outcome::Done(Box::new(group)));
-            }
-            Some(("failed", rest)) => outcome = Some(Outcome::Failed(rest.into())),
-            _ => {}
-        }
-    }
-    progress.step();
-    let status = worker.0.wait().map_err(BenchError::Start)?;
-    drop(stdin);
-    let said = said.join().unwrap_or_default();
-    Ok(outcome.unwrap_or_else(|| Outcome::Died {
-        label,
-        reason: death(status, &said),
-    }))
-}
-
-/// How a process ended, and the last it said.
-fn death(status: ExitStatus, said: &str) -> String {
-    let last = said.lines().map(str::trim).rfind(|line| !line.is_empty());
-    match last {
-        Some(last) => format!("the process ended with {status}: {last}"),
-        None => format!("the process ended with {status}"),
-    }
-}
-
-/// The other side of [`run_in_process`].
-fn work() -> Result<(), CliError> {
-    let fault = |reason: String| CliError::from(BenchError::Job(reason));
-    let mut line = String::new();
-    let read = io::stdin().read_line(&mut line);
-    read.map_err(|error| fault(error.to_string()))?;
-    let job: Job = serde_json::from_str(&line).map_err(|error| fault(error.to_string()))?;
-    std::thread::spawn(|| {
-        // Nothing more is said; this returns once the parent is gone.
-        let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
-        // Not `std::process::exit`: it does not go together with drivers' threads.
-        signal_hook::low_level::exit(1);
-    });
-    let say = |what: &str, text: &str| print_text(&format!("{what} {text}\n"));
-    let on_step = |label: &str| {
-        // Without a reader there is no parent.
-        let _ = say("step", label);
-    };
-    let on_device = |gpu: &mut Gpu| {
-        if let Some(file) = pipeline_cache::file(gpu.info()) {
-            gpu.use_pipeline_cache(file);
-        }
-    };
-    match group::run(&job, &on_step, &on_device) {
-        Ok(group) => say("result", &serde_json::to_string(&group)?),
-        Err(error) => say("failed", &crate::message::line(&error)),
-    }
 }
 
 /// One line a cell, and the files.
@@ -446,13 +404,16 @@ fn summary(results: &Results, file: &Path, page: &Output) -> String {
 }
 
 /// Fails if a cell did, but not for techniques that cannot do a light.
-fn judge(results: &Results, file: PathBuf) -> Result<(), CliError> {
-    let is_fault = |kind| kind != FailureKind::Unsupported;
-    let failed = results
-        .failures
-        .iter()
-        .filter(|cell| is_fault(cell.failure.kind));
-    let failed: Vec<_> = failed.collect();
+pub(super) fn judge<'r>(
+    all: impl IntoIterator<Item = &'r Results>,
+    file: PathBuf,
+) -> Result<(), CliError> {
+    let (mut failed, mut cells) = (Vec::new(), 0);
+    for results in all {
+        let faults = results.failures.iter();
+        failed.extend(faults.filter(|cell| cell.failure.kind != FailureKind::Unsupported));
+        cells += results.images.len();
+    }
     let Some(first) = failed.first() else {
         return Ok(());
     };
@@ -462,7 +423,7 @@ fn judge(results: &Results, file: PathBuf) -> Result<(), CliError> {
     );
     Err(BenchError::Cells {
         failed: failed.len(),
-        all: results.images.len(),
+        all: cells,
         first,
         file,
     }

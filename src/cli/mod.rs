@@ -7,6 +7,8 @@ mod args;
 mod batch;
 mod batch_run;
 mod bench;
+mod bench_study;
+mod bench_worker;
 mod capture;
 mod compare;
 mod error;

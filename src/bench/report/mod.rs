@@ -129,7 +129,7 @@ fn footer(page: &mut String, results: &Results) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::bench::group::blank_entry;
     use crate::bench::results::{Entry, FailedCell, Pass, ReferenceEntry, Settings};
@@ -137,13 +137,15 @@ mod tests {
     use crate::measure::{ErrorMeasures, Measures};
 
     /// One scene with an odd name, a technique with a result and one that crashed.
-    fn results() -> Results {
+    /// A cell with a result and one that crashed.
+    pub(in crate::bench) fn results() -> Results {
         let techniques = vec!["hard".to_string(), "rays:4".to_string()];
         let job = Job {
             scene: "<b>&.gltf".into(),
             case: None,
             light: 0,
             light_name: "\"lamp\"".into(),
+            light_scale: 1.0,
             camera: None,
             contenders: techniques.clone(),
             size: [4, 4],
@@ -162,6 +164,7 @@ mod tests {
             samples: 16,
             cell_seconds: 1.0,
             device: None,
+            light_scale: 1.0,
         });
         let blank = |label: &str| {
             let contender: Contender = label.parse().unwrap_or_else(|error| panic!("{error}"));

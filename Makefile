@@ -1,4 +1,4 @@
-.PHONY: help demo test bench bench-check bench-plan bench-batch study studies slurm-test cluster-check clean-deps
+.PHONY: help demo test bench bench-check bench-plan bench-batch figures study studies slurm-test cluster-check clean-deps
 
 # For make bench: scenes, what is held against each other, picture size, and where it goes.
 SCENES ?= assets
@@ -20,6 +20,7 @@ help:
 	@echo "make test        set up this machine, then run every check and test"
 	@echo "make bench       run time against error of all techniques over all scenes, to out/bench/"
 	@echo "make bench-check look at out/bench/report.html in headless Chromium"
+	@echo "make figures     scenes after the papers' figures, to out/figures/"
 	@echo "make study       the tables of one file of benches/studies/, to out/studies/: STUDY=name"
 	@echo "make studies     the tables of all"
 	@echo "make bench-plan  criterion benchmarks of the render graph"
@@ -48,12 +49,16 @@ bench:
 bench-check:
 	scripts/report_browser.py $(OUT)/report.html $(OUT)/screenshots
 
-study:
+figures:
+	scripts/setup.sh bench
+	cargo run --release $(EMBREE) --example make_figures -- out/figures
+
+study: figures
 	scripts/setup.sh bench
 	cargo build --release $(EMBREE)
 	$(BIN) bench --study benches/studies/$(STUDY).toml --out out/studies/$(STUDY) $(STUDY_OPTIONS)
 
-studies:
+studies: figures
 	for study in $(basename $(notdir $(wildcard benches/studies/*.toml))); do $(MAKE) study STUDY=$$study || exit 1; done
 
 bench-plan:

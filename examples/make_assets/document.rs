@@ -8,6 +8,7 @@ use super::mesh::Mesh;
 pub const FLOAT: u32 = 5126;
 const U8: u32 = 5121;
 const U16: u32 = 5123;
+const U32: u32 = 5125;
 /// What a buffer view is for: vertices.
 const VERTICES: u32 = 34962;
 const INDICES: u32 = 34963;
@@ -243,12 +244,19 @@ impl Document {
             );
             let _ = write!(attributes, r#","JOINTS_0":{joints},"WEIGHTS_0":{weights}"#);
         }
-        let data: Vec<u8> = mesh.indices.iter().flat_map(|i| i.to_le_bytes()).collect();
+        let indices = mesh.indices.iter();
+        let (kind, data): (u32, Vec<u8>) = match mesh.positions.len() {
+            0..=0xffff => (
+                U16,
+                indices.flat_map(|i| (*i as u16).to_le_bytes()).collect(),
+            ),
+            _ => (U32, indices.flat_map(|i| i.to_le_bytes()).collect()),
+        };
         let count = mesh.indices.len();
         let indices = self.accessor(
             &data,
             INDICES,
-            &format!(r#""componentType":{U16},"count":{count},"type":"SCALAR""#),
+            &format!(r#""componentType":{kind},"count":{count},"type":"SCALAR""#),
         );
         let targets = match &moving.morph {
             None => String::new(),

@@ -9,18 +9,18 @@ pub struct Mesh {
     pub normals: Vec<V3>,
     /// Empty, or one a vertex.
     pub uvs: Vec<[f64; 2]>,
-    pub indices: Vec<u16>,
+    pub indices: Vec<u32>,
 }
 
 impl Mesh {
     /// A convex polygon, counter-clockwise from the front, with a normal for each corner.
     pub fn polygon(&mut self, corners: &[(V3, V3)]) {
-        let first = self.positions.len() as u16;
+        let first = self.positions.len() as u32;
         for (position, normal) in corners {
             self.positions.push(*position);
             self.normals.push(*normal);
         }
-        for i in 2..corners.len() as u16 {
+        for i in 2..corners.len() as u32 {
             self.indices.extend([first, first + i - 1, first + i]);
         }
     }
@@ -47,7 +47,7 @@ impl Mesh {
     }
 
     pub fn append(&mut self, other: &Self) {
-        let first = self.positions.len() as u16;
+        let first = self.positions.len() as u32;
         self.positions.extend(&other.positions);
         self.normals.extend(&other.normals);
         self.uvs.extend(&other.uvs);

@@ -110,7 +110,7 @@ pub fn sphere(n: u32) -> Mesh {
     let mut mesh = Mesh::default();
     let mut known = BTreeMap::new();
     for [a, b, c] in faces {
-        let mut vertex = |i: u32, j: u32| -> u16 {
+        let mut vertex = |i: u32, j: u32| -> u32 {
             let (u, v) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
             let along = |k: usize| {
                 let (a, b, c): (f64, f64, f64) = (corners[a][k], corners[b][k], corners[c][k]);
@@ -122,7 +122,7 @@ pub fn sphere(n: u32) -> Mesh {
             *known.entry(key).or_insert_with(|| {
                 mesh.positions.push(p);
                 mesh.normals.push(p);
-                (mesh.positions.len() - 1) as u16
+                (mesh.positions.len() - 1) as u32
             })
         };
         let mut triangles = Vec::new();
@@ -265,12 +265,12 @@ pub fn lathe(sides: u32, outline: &[[f64; 2]]) -> Mesh {
             mesh.normals.push([nr * c, ny, -nr * s]);
         }
     }
-    let n = sides as u16;
+    let n = sides;
     for i in 1..outline.len() {
         if slope(outline[i - 1], outline[i]).is_none() {
             continue;
         }
-        let (low, high) = ((i as u16 - 1) * n, i as u16 * n);
+        let (low, high) = ((i as u32 - 1) * n, i as u32 * n);
         for k in 0..n {
             let next = (k + 1) % n;
             if outline[i - 1][0] > 0.0 {
@@ -327,9 +327,9 @@ pub fn tube(sides: u32, path: &[(V3, f64)]) -> Mesh {
             });
         }
     }
-    let n = sides as u16;
+    let n = sides;
     for i in 1..path.len() {
-        let (low, high) = ((i as u16 - 1) * n, i as u16 * n);
+        let (low, high) = ((i as u32 - 1) * n, i as u32 * n);
         for k in 0..n {
             let next = (k + 1) % n;
             if path[i - 1].1 > 0.0 {

@@ -189,15 +189,15 @@ fn body(joints: &[Joint]) -> (Body, Vec<(u16, V3)>) {
 
 /// A flag on its pole's upper end, blown to -X, and its moves and turns to the other wave.
 fn flag() -> (Mesh, Vec<V3>, Vec<V3>) {
-    const N: [u16; 2] = [18, 10];
-    let part = |i: u16, axis: usize| f64::from(i) / f64::from(N[axis]);
+    const N: [u32; 2] = [18, 10];
+    let part = |i: u32, axis: usize| f64::from(i) / f64::from(N[axis]);
     let wave = |x: f64, y: f64, phase: f64| {
         let (s, c) = (9.0 * x - 1.2 * y + phase).sin_cos();
         let height = 0.09 * x;
         let slope = [0.09 * s + 9.0 * height * c, -1.2 * height * c];
         (height * s, slope)
     };
-    let state = |i: u16, j: u16, phase: f64| {
+    let state = |i: u32, j: u32, phase: f64| {
         let (x, y) = (part(i, 0), part(j, 1));
         let (z, [sx, sy]) = wave(x, y, phase);
         let (width, height) = (0.56, 0.36);
@@ -217,7 +217,7 @@ fn flag() -> (Mesh, Vec<V3>, Vec<V3>) {
     }
     for j in 0..N[1] {
         for i in 0..N[0] {
-            let at = |i: u16, j: u16| j * (N[0] + 1) + i;
+            let at = |i: u32, j: u32| j * (N[0] + 1) + i;
             let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
             mesh.indices.extend([a, c, b, a, d, c]);
         }

@@ -102,10 +102,10 @@ pub fn mirrored() -> Document {
         .turned(0.4)
         .moved([1.75, 0.21, 0.9]);
     let mut doubled = Mesh::joined([cube.clone(), cube.clone()]);
-    let again: Vec<u16> = cube.inside_out().indices;
+    let again: Vec<u32> = cube.inside_out().indices;
     doubled.indices.extend(again);
     doubled.indices.extend([0, 0, 1, 5, 5, 5]);
-    let first = doubled.positions.len() as u16;
+    let first = doubled.positions.len() as u32;
     for i in 0..3 {
         doubled.positions.push([1.6 + 0.1 * f64::from(i), 0.6, 0.9]);
         doubled.normals.push([0.0, 1.0, 0.0]);

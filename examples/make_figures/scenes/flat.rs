@@ -122,7 +122,7 @@ pub fn knot(height: f64) -> Document {
     let mesh = mesh.pitched(0.3).moved([0.0, height, 0.0]);
     b.add("knot", brass, &mesh);
     disk(&mut b, 0.2, [-1.0, 4.6, 0.8], [0.0, 0.5, 0.0]);
-    b.camera("camera", 38.0, [0.7, 3.8, 4.8], [0.25, 0.6, -0.1]);
+    b.camera("camera", 38.0, [0.8, 4.2, 5.6], [0.3, 1.0, -0.1]);
     b
 }
 

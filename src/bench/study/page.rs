@@ -47,8 +47,9 @@ fn conditions(results: &Results) -> String {
     let cpu = machine.cpu.as_deref().unwrap_or("unknown processor");
     let driver = results.driver.as_deref();
     let rounds = results.settings.repeat;
+    let plural = if rounds == 1 { "" } else { "s" };
     let line = format!(
-        "Measured by {} on {cpu}, {threads} threads, {os}; {}. Times are medians of {rounds} rounds, \
+        "Measured by {} on {cpu}, {threads} threads, {os}; {}. Times are medians of {rounds} round{plural}, \
          fewer for slow cells, all techniques in turn; errors are those of visibility, 0 to 1, against \
          ray tracing.",
         results.program,

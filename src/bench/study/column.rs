@@ -4,8 +4,9 @@ use std::str::FromStr;
 
 use super::super::results::{Entry, Pass, ReferenceEntry};
 
-/// A value of one cell: terms multiplied and divided from left to right, with spaces around `*`
-/// and `/`, and a heading after ` as `, such as `visibility_ms / counter:triangles as ms each`.
+/// A value of one cell: terms with `*`, `/`, `+` and `-` between them, each with spaces around it,
+/// worked out from left to right without precedence, and a heading after ` as `, such as
+/// `visibility_ms / counter:triangles as ms each`.
 ///
 /// | term | value |
 /// |---|---|
@@ -37,6 +38,8 @@ pub struct Column {
 enum Operator {
     Times,
     Over,
+    Plus,
+    Minus,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +97,7 @@ pub enum ColumnError {
         known()
     )]
     Unknown { name: String },
-    #[error("give terms with * or / between them")]
+    #[error("give terms with *, /, + or - between them")]
     Form,
 }
 
@@ -109,12 +112,14 @@ impl FromStr for Column {
     fn from_str(text: &str) -> Result<Self, ColumnError> {
         let padded = format!("{text} ");
         let (terms, heading) = padded.rsplit_once(" as ").unwrap_or((text, text));
-        // Patterns have spaces and stars too: a star is an operator only by itself.
+        // Patterns have spaces and stars too: an operator stands by itself.
         let mut parts: Vec<(Option<Operator>, Vec<&str>)> = vec![(None, Vec::new())];
         for word in terms.split_whitespace() {
             let operator = match word {
                 "*" => Some(Operator::Times),
                 "/" => Some(Operator::Over),
+                "+" => Some(Operator::Plus),
+                "-" => Some(Operator::Minus),
                 _ => None,
             };
             match (operator, parts.last_mut()) {
@@ -226,6 +231,8 @@ impl Column {
             match operator {
                 Operator::Times => value *= term,
                 Operator::Over => value /= term,
+                Operator::Plus => value += term,
+                Operator::Minus => value -= term,
             }
         }
         value.is_finite().then_some(value)
@@ -316,12 +323,14 @@ mod tests {
 
     #[test]
     fn columns_are_terms_with_a_heading() -> Result<(), ColumnError> {
-        let column: Column = "passes:hard.map 0* * 1000 / triangles as us each".parse()?;
+        let column: Column =
+            "passes:hard.map 0* * 1000 / triangles - frame_ms as us each".parse()?;
         assert_eq!(column.heading, "us each");
         assert_eq!(column.first, Term::Passes("hard.map 0*".into()));
         let rest = [
             (Operator::Times, Term::Number(1000.0)),
             (Operator::Over, Term::Named(Name::Triangles)),
+            (Operator::Minus, Term::Named(Name::FrameMs)),
         ];
         assert_eq!(column.rest, rest);
         assert_eq!(column.kind(), Kind::Other);

@@ -404,4 +404,17 @@ mod tests {
             .map(|error| error.to_string());
         assert!(error.is_some_and(|error| error.starts_with("none.toml: cannot be read")));
     }
+
+    #[test]
+    fn the_studies_here_are_right() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/studies");
+        let mut count = 0;
+        for entry in fs::read_dir(folder)? {
+            let study = Study::read(&entry?.path())?;
+            assert!(!study.tables.is_empty());
+            count += 1;
+        }
+        assert!(count > 0);
+        Ok(())
+    }
 }

@@ -368,13 +368,13 @@ mod tests {
     #[test]
     fn a_table_has_what_differs_and_notes_what_failed() {
         let study =
-            study("columns = [\"rmse as a|b\", \"passes:map* / 4\", \"visibility_ratio\"]\n");
+            study("columns = [\"rmse as a|b\", \"passes:map* - 1 / 2\", \"visibility_ratio\"]\n");
         let page = page(&study, &[measured()]);
         for part in [
             "# T\n\nAbout.\n",
             "\n## A\n\nReproduces: Table 1.\n",
             "\nScene <b>&; light \"lamp\"; size 4x4; 16 light samples",
-            "\n| light \u{d7} | technique | a\\|b | passes:map* / 4 | visibility_ratio |\n\
+            "\n| light \u{d7} | technique | a\\|b | passes:map* - 1 / 2 | visibility_ratio |\n\
              | --- | --- | ---: | ---: | ---: |\n\
              | 1 | `hard` | 0.2500 | 0.500 | 1.00 |\n\
              | 1 | `rays:4` | failed | \u{2013} | \u{2013} |\n\

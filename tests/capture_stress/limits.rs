@@ -119,9 +119,11 @@ pub fn leak(technique: Technique) -> f32 {
 
 /// Techniques that are not finished, and not tested here before they are.
 ///
-/// `oess` holds on Mesa. On SwiftShader, whose sub-texel grid is 16 times as coarse, the case `cage` scaled by
-/// 1e4 changes 505 of 3058 pixels by up to 0.21, and read far away 161.
-const IN_WORK: [&str; 5] = ["ssoc", "mdi", "dbuffer", "oess", "shaft-masks"];
+/// The relations are asked on Mesa, cases by themselves on SwiftShader too. Of the relations SwiftShader, with a
+/// sixteenth of the sub-texel steps, breaks some: `pcss` in `far-and-near` turned (59 of 3215 pixels),
+/// `occlusion-textures` in `shut-in` scaled (100 of 4096, by up to 0.01), and `oess` in `cage`, where a line lies
+/// within a mesh with dozens of holes and edges beside the line come and go (mean changes of up to 0.06).
+const IN_WORK: [&str; 4] = ["ssoc", "mdi", "dbuffer", "shaft-masks"];
 
 /// All techniques that must hold.
 pub fn finished() -> impl Iterator<Item = Technique> {

@@ -71,6 +71,9 @@ struct Receiver {
     float side;  // texels of a texture across
 };
 
+// Defined by the entry file: halves of the box for its filter.
+vec2 filter_halves(vec2 halves);
+
 Kernel kernel_at(Receiver at, float plane, float inverse) {
     bool sun = LIGHT_SHAPE == LIGHT_SUN;
     float along = sun ? 1.0 : plane / at.v.z;
@@ -78,11 +81,12 @@ Kernel kernel_at(Receiver at, float plane, float inverse) {
     vec2 middle = (at.v.xy * (along * inverse) - vec2(slice_view.right.w, slice_view.up.w))
         * slice_view.scale.xy * at.side;
     vec2 halves = at.halves * abs(slice_view.scale.xy) * (wide * inverse * at.side);
-    vec2 box = max(halves, vec2(0.5));
+    vec2 box = filter_halves(halves);
     vec2 known_low = slice_view.border.xy * at.side;
     vec2 known_high = slice_view.border.zw * at.side;
-    return Kernel(middle, halves, clamp(middle - box, known_low, known_high - 1.0),
-        clamp(middle + box, known_low + 1.0, known_high));
+    vec2 least = min(2.0 * box, 1.0);
+    return Kernel(middle, halves, clamp(middle - box, known_low, known_high - least),
+        clamp(middle + box, known_low + least, known_high));
 }
 
 // Fine slices with anything in a box of texels, and in those beside it.

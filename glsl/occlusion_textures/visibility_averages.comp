@@ -11,6 +11,11 @@ layout(constant_id = 11) const uint GROUPS = 1u;     // layers of a level
 
 layout(set = 0, binding = 5) uniform sampler2DArray averages;
 
+// A square is at least a texel wide.
+vec2 filter_halves(vec2 halves) {
+    return max(halves, vec2(0.5));
+}
+
 float texture_side() {
     return float(textureSize(averages, 0).x);
 }

@@ -8,7 +8,14 @@ layout(constant_id = 2) const uint PACKED = 1u; // two sums in a component
 layout(constant_id = 3) const uint LAYERS = 1u; // of a set of tables: the second set of COMBINE_BOUNDED
                                                 // holds what all groups up to one block
 
+const float LEAST = 0.5; // half a texel: below it edges would show the texels
+
 layout(set = 0, binding = 5) uniform usampler2DArray tables;
+
+// A table is smooth within its texels, which alone blurs by the variance of a texel: the box takes the rest.
+vec2 filter_halves(vec2 halves) {
+    return max(sqrt(max(halves * halves - 0.25, 0.0)), LEAST);
+}
 
 float texture_side() {
     return float(textureSize(tables, 0).x - 1);

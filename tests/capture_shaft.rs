@@ -101,7 +101,7 @@ fn check(renderer: &mut FrameRenderer<'static>, name: &str, side: u32) {
     let scene = load(name);
     let camera = scene.select_camera(None).unwrap();
     let samples = side * side;
-    let technique = format!("shaft-masks:samples={samples}");
+    let technique = format!("shaft-masks:samples={samples},target-error=none");
     let images = render(renderer, &scene, &camera, &[&technique]);
     let reference = Reference::new(&scene).unwrap();
     let (images, surfaces) = &images[0];
@@ -183,11 +183,11 @@ fn lists_without_room_change_nothing() {
         }
     };
     let techniques = [
-        "shaft-masks:samples=64",
-        "shaft-masks:samples=64,room=0",
+        "shaft-masks:samples=64,target-error=none",
+        "shaft-masks:samples=64,target-error=none,room=0",
         // Room for some lists, and for the beginnings of others: which ones may differ from run to run.
-        "shaft-masks:samples=64,room=4",
-        "shaft-masks:samples=64,room=12",
+        "shaft-masks:samples=64,target-error=none,room=4",
+        "shaft-masks:samples=64,target-error=none,room=12",
     ];
     same("figure.glb", &techniques);
     // Tens of thousands of triangles in a shaft, cut out by their texture.
@@ -228,8 +228,18 @@ fn errors_are_within_their_bounds() {
     // A disk, a line and a sun: a rectangle's cells are simpler, and a sphere's those of a disk.
     for light in [0, 3, 4] {
         let name = &scene.lights[light].name;
-        let (few, bound) = bounded(&mut renderer, &camera, light, "shaft-masks:samples=64");
-        let (many, finer) = bounded(&mut renderer, &camera, light, "shaft-masks:samples=256");
+        let (few, bound) = bounded(
+            &mut renderer,
+            &camera,
+            light,
+            "shaft-masks:samples=64,target-error=none",
+        );
+        let (many, finer) = bounded(
+            &mut renderer,
+            &camera,
+            light,
+            "shaft-masks:samples=256,target-error=none",
+        );
         let (mut penumbra, mut sums, mut worst) = (0, [0.0; 2], 0.0f32);
         for i in 0..few.len() {
             let off = (few[i] - many[i]).abs();

@@ -35,9 +35,11 @@ layout(set = 0, binding = 8) uniform usampler2D edge_pool;
 layout(set = 0, binding = 9) uniform usampler2D triangle_pool;
 layout(set = 0, binding = 10) uniform usampler2D lists;
 layout(set = 0, binding = 11, r32f) uniform writeonly image2D error_bound;
+layout(set = 0, binding = 12, r32ui) uniform uimage2D estimates;
 
 #define SUN_TANGENT_SQUARE (view.light.axis_x.w * view.light.axis_x.w)
 
+#include "shaft_masks/estimates.glsl"
 #include "shaft_masks/lists.glsl"
 #include "shaft_masks/masks.glsl"
 
@@ -203,7 +205,9 @@ void main() {
     uvec2 pixel = tile_of_part(part, tiles) * TILE_SIZE + gl_LocalInvocationID.xy;
     uvec2 within = min(pixel, params.counts.xy - 1u);
     float depth = texelFetch(view_depth, ivec2(within), 0).x;
-    if (stored.w == TILE_SETTLED || depth <= 0.0 || !is_in_part(fetch_part_depths(part), depth)) {
+    // Tiles that were worked on again have a bound of their own.
+    bool is_last = imageLoad(estimates, estimate_place(part, ESTIMATE_LEVEL)).x == params.pattern.w;
+    if (!is_last || depth <= 0.0 || !is_in_part(fetch_part_depths(part), depth)) {
         return;
     }
     vec3 ray = pixel_ray(view.camera, within);
@@ -249,7 +253,10 @@ void main() {
         undecided += bitCount(cells.x) + bitCount(cells.y);
     }
     // A light of no size has no cells: its one point is seen or not.
-    float all = float(params.pattern.y * ROWS * COLUMNS);
-    float bound = !known ? 1.0 : LIGHT_SHAPE == LIGHT_POINT ? 0.0 : float(undecided) / all;
+    float cell_count = float(params.pattern.y * ROWS * COLUMNS);
+    float bound = !known ? 1.0 : LIGHT_SHAPE == LIGHT_POINT ? 0.0 : float(undecided) / cell_count;
     imageStore(error_bound, ivec2(pixel), vec4(bound));
+    if (all(lessThan(pixel, params.counts.xy))) {
+        imageAtomicMax(estimates, estimate_place(part, ESTIMATE_BOUND), floatBitsToUint(bound));
+    }
 }

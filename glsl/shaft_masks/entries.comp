@@ -12,6 +12,7 @@
 
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
+#include "shaft_masks/estimates.glsl"
 #include "shaft_masks/lists.glsl"
 #include "shaft_masks/sides.glsl"
 
@@ -56,6 +57,7 @@ layout(set = 0, binding = 19, std430) buffer PiecesArguments {
     TileArguments pieces;
 };
 layout(set = 0, binding = 20, r32ui) uniform writeonly uimage2D pieces_list;
+layout(set = 0, binding = 21, r32ui) uniform writeonly uimage2D estimates;
 
 // Pairs of corners that an invocation looks at to find a dark tile.
 const uint MOST_LOOKS = 256u;
@@ -284,7 +286,10 @@ void main() {
         ivec2 at = list_place(part);
         imageStore(lists, at, uvec4(candidates.xy, resume, dark ? TILE_SETTLED : TILE_OPEN));
         imageStore(lists, at + ivec2(1, 0), uvec4(first_edge, fits ? edges : 0u, first_triangle, candidates.y));
-        imageStore(lists, at + ivec2(2, 0), uvec4(whole, others, 0u, 0u));
+        imageStore(lists, at + ivec2(2, 0), uvec4(whole, others, tile.y * tiles.x + tile.x, 0u));
+        uint work = (fits ? edges : 0u) + whole + others + (params.counts.z - resume);
+        imageStore(estimates, estimate_place(part, ESTIMATE_WORK), uvec4(work));
+        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(dark ? 0u : params.pattern.w));
         if (!dark && (params.pattern.y > 1u || whole + others > TASK_ENTRIES || partly)) {
             uint slot = atomicAdd(pieces.count, 1u);
             atomicMax(pieces.groups_x, min(slot + 1u, TILE_ROW));

@@ -33,10 +33,11 @@ struct Entries {
     uint room;   // of the run
     uint whole;  // triangles between all surfaces and the light's plane
     uint others; // triangles that are not, or have holes
+    uint slot;   // of its words
 };
 
 Entries entries_of(uvec4 first, uvec4 second) {
-    return Entries(first.x, first.y, first.z, first.w, second.x, second.y);
+    return Entries(first.x, first.y, first.z, first.w, second.x, second.y, second.z);
 }
 
 ivec2 list_place(uvec2 part) {

@@ -37,6 +37,7 @@ layout(set = 0, binding = 14, r32f) uniform writeonly image2D visibility;
 layout(set = 0, binding = 15) uniform usampler2D tasks;
 layout(set = 0, binding = 16, r32ui) uniform uimage2D words;
 layout(set = 0, binding = 17) uniform usampler2D triangle_pool;
+layout(set = 0, binding = 18, r32ui) uniform uimage2D estimates;
 
 layout(push_constant) uniform Push {
     uint first_run; // of nodes, of this dispatch
@@ -46,6 +47,7 @@ layout(push_constant) uniform Push {
 
 #define SUN_TANGENT_SQUARE (view.light.axis_x.w * view.light.axis_x.w)
 
+#include "shaft_masks/estimates.glsl"
 #include "shaft_masks/lists.glsl"
 #include "shaft_masks/masks.glsl"
 
@@ -88,9 +90,10 @@ MaskReceiver fetch_receiver(uvec2 pixel, vec2 depths, out uvec2 blocked) {
     return receiver;
 }
 
-void store(uint tile, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 blocked, bool in_parts) {
+// Stores what a receiver sees; returns its part of its tile's ESTIMATE_CHANGES.
+uint store(uint slot, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 blocked, bool in_parts) {
     if (!receiver.in_part) {
-        return;
+        return 0u;
     }
     blocked = receiver.id == 0u ? uvec2(0u) : blocked;
     if (!in_parts) {
@@ -98,16 +101,17 @@ void store(uint tile, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 bloc
         int hidden = bitCount(blocked.x) + bitCount(blocked.y);
         float samples = float(ROWS * COLUMNS);
         imageStore(visibility, ivec2(pixel), vec4((samples - float(hidden)) / samples));
-        return;
+        return all(lessThan(pixel, params.counts.xy)) ? changed_pixel(changes_in(blocked)) : 0u;
     }
     for (uint word = 0u; word < 2u; ++word) {
-        ivec2 place = word_place(tile, pixel % TILE_SIZE, params.pattern.y, 2u * block + word);
+        ivec2 place = word_place(slot, pixel % TILE_SIZE, params.pattern.y, 2u * block + word);
         if (WALK != 0u || push.further != 0u) {
             imageAtomicOr(words, place, blocked[word]);
         } else {
             imageStore(words, place, uvec4(blocked[word]));
         }
     }
+    return 0u; // all of them are known later
 }
 
 void main() {
@@ -120,7 +124,6 @@ void main() {
         : texelFetch(list, tile_entry_place(index, tiles), 0);
     uvec2 part = part_of_entry(task.x, tiles);
     uvec2 tile = tile_of_part(part, tiles);
-    uint number = tile.y * tiles.x + tile.x;
     vec2 depths = fetch_part_depths(part);
     ivec2 at = list_place(part);
     uvec4 stored = texelFetch(lists, at, 0);
@@ -224,8 +227,11 @@ void main() {
             }
         }
     }
-    store(number, block, pixel, receiver_0, blocked_0, in_parts);
-    store(number, block, pixel + step, receiver_1, blocked_1, in_parts);
-    store(number, block, pixel + 2u * step, receiver_2, blocked_2, in_parts);
-    store(number, block, pixel + 3u * step, receiver_3, blocked_3, in_parts);
+    uint changes = store(entries.slot, block, pixel, receiver_0, blocked_0, in_parts)
+        + store(entries.slot, block, pixel + step, receiver_1, blocked_1, in_parts)
+        + store(entries.slot, block, pixel + 2u * step, receiver_2, blocked_2, in_parts)
+        + store(entries.slot, block, pixel + 3u * step, receiver_3, blocked_3, in_parts);
+    if (changes > 0u) {
+        imageAtomicAdd(estimates, estimate_place(part, ESTIMATE_CHANGES), changes);
+    }
 }

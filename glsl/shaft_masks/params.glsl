@@ -9,7 +9,8 @@ const uint MOST_ROWS = 32u;
 
 struct ShaftParams {
     uvec4 counts;  // width and height of the picture in pixels, nodes, chunks of the pool of candidates
-    uvec4 pattern; // blocks of samples along an axis, all blocks, edges that their pool has room for
+    // Blocks of samples along an axis, all blocks, edges that their pool has room for, level: 64 * 4^(level - 1) samples.
+    uvec4 pattern;
     // Of each row its place along the second axis, -1 to 1. Where x is the place along the first one,
     // -1 to 1, samples stand at the whole columns plus 0.5 of y x + z, of a sun of
     // y x / sqrt(w + (tangent of half its angle * x)^2) + z.

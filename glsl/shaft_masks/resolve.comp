@@ -2,6 +2,8 @@
 // Visibility of the tiles whose masks were made in pieces.
 
 #include "common/tiles.glsl"
+#include "shaft_masks/estimates.glsl"
+#include "shaft_masks/lists.glsl"
 #include "shaft_masks/shaft.glsl"
 #include "shaft_masks/words.glsl"
 
@@ -18,6 +20,8 @@ layout(set = 0, binding = 3) uniform usampler2D words;
 layout(set = 0, binding = 4, r32f) uniform writeonly image2D visibility;
 layout(set = 0, binding = 5) uniform sampler2D view_depth;
 layout(set = 0, binding = 6) uniform sampler2D shafts;
+layout(set = 0, binding = 7) uniform usampler2D lists;
+layout(set = 0, binding = 8, r32ui) uniform uimage2D estimates;
 
 vec4 fetch_triangle_texel(uint texel) {
     return vec4(0.0); // none is needed here
@@ -47,9 +51,16 @@ void main() {
         return;
     }
     int hidden = 0;
-    for (uint word = 0u; word < 2u * blocks; ++word) {
-        ivec2 place = word_place(tile.y * tiles.x + tile.x, gl_LocalInvocationID.xy, blocks, word);
-        hidden += bitCount(texelFetch(words, place, 0).x);
+    uint slot = texelFetch(lists, list_place(part) + ivec2(2, 0), 0).z;
+    uint changes = 0u;
+    for (uint block = 0u; block < blocks; ++block) {
+        uvec2 mask = uvec2(texelFetch(words, word_place(slot, gl_LocalInvocationID.xy, blocks, 2u * block), 0).x,
+            texelFetch(words, word_place(slot, gl_LocalInvocationID.xy, blocks, 2u * block + 1u), 0).x);
+        hidden += bitCount(mask.x) + bitCount(mask.y);
+        changes += changes_in(mask);
+    }
+    if (changes > 0u && all(lessThan(pixel, params.counts.xy))) {
+        imageAtomicAdd(estimates, estimate_place(part, ESTIMATE_CHANGES), changed_pixel(changes));
     }
     float samples = float(ROWS * COLUMNS * blocks);
     imageStore(visibility, ivec2(pixel), vec4((samples - float(hidden)) / samples));

@@ -9,9 +9,18 @@
 const uint ROWS = 8u;
 const uint COLUMNS = 8u;
 
-ivec2 word_place(uint tile, uvec2 within, uint blocks, uint word) {
-    uint pixel = tile * TILE_SIZE * TILE_SIZE + within.y * TILE_SIZE + within.x;
+// slot: of the tile among those that words are made of at once.
+ivec2 word_place(uint slot, uvec2 within, uint blocks, uint word) {
+    uint pixel = slot * TILE_SIZE * TILE_SIZE + within.y * TILE_SIZE + within.x;
     return triangle_texel_place(pixel * 2u * blocks + word);
+}
+
+// Pairs of neighbouring samples, in a row or a column of a block, of which one is hidden and one is not.
+uint changes_in(uvec2 mask) {
+    uvec2 rows = (mask ^ mask >> 1) & 0x7f7f7f7fu;
+    uvec2 columns = (mask ^ mask >> 8) & 0x00ffffffu;
+    uint between = (mask.x >> 24 ^ mask.y) & 0xffu;
+    return uint(bitCount(rows.x) + bitCount(rows.y) + bitCount(columns.x) + bitCount(columns.y) + bitCount(between));
 }
 
 #endif

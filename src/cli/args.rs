@@ -158,6 +158,13 @@ impl ViewArgs {
         }
     }
 
+    /// Sets an option of the technique.
+    pub(super) fn set_option(&mut self, option: &str, value: &str) -> Result<(), CliError> {
+        let set = self.technique.with_option(option, value);
+        self.technique = set.map_err(|error| CliError::Usage(format!("--{option}: {error}")))?;
+        Ok(())
+    }
+
     pub(super) fn scene_path(&self) -> &PathBuf {
         &self.scene
     }

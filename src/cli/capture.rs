@@ -91,6 +91,9 @@ pub(super) struct CaptureArgs {
     #[command(flatten)]
     shard: ShardArgs,
 
+    #[command(flatten)]
+    refinement: RefinementArgs,
+
     /// Timings, memory and counters as JSON; renders 2 warm-up frames first, then measures 7
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
@@ -116,7 +119,44 @@ pub(super) struct CaptureArgs {
     view: ViewArgs,
 }
 
+/// Options of techniques that work on until the error is small enough, by their own names.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "How far to go, of techniques with such options: shaft-masks")]
+struct RefinementArgs {
+    /// Estimated root mean square error of the penumbra's pixels; none for as few samples as asked for
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    target_error: Option<String>,
+
+    /// Proven bound on the error of every pixel
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    bound: Option<String>,
+
+    /// Milliseconds of the device for a light after which nothing more is begun
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
+    budget_ms: Option<String>,
+
+    /// Most steps of work beyond the first picture: the same picture on every run
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    budget_work: Option<String>,
+}
+
+impl RefinementArgs {
+    fn given(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        let all = [
+            ("target-error", &self.target_error),
+            ("bound", &self.bound),
+            ("budget-ms", &self.budget_ms),
+            ("budget-work", &self.budget_work),
+        ];
+        let given = all.into_iter();
+        given.filter_map(|(name, value)| value.as_deref().map(|value| (name, value)))
+    }
+}
+
 pub(super) fn run(mut args: CaptureArgs) -> Result<(), CliError> {
+    for (option, value) in args.refinement.given() {
+        args.view.set_option(option, value)?;
+    }
     // An image of the frame like others.
     args.dump
         .extend(args.visibility_bound.take().map(|file| DumpArg {

@@ -127,6 +127,36 @@ impl Gpu {
         }
     }
 
+    /// Writes the device's clock into a buffer, 64 bits in ticks of [`Gpu::tick_ms`], once all that
+    /// was recorded before is done. Writes nothing on a queue without timestamps.
+    ///
+    /// # Errors
+    /// A failing call.
+    pub(crate) fn write_clock(
+        &mut self,
+        cmd: vk::CommandBuffer,
+        buffer: vk::Buffer,
+        offset: u64,
+    ) -> Result<(), GpuError> {
+        let Some(scope) = self.begin_timing(cmd, "clock")?.0 else {
+            return Ok(());
+        };
+        let (pool, query) = place(scope);
+        let pool = self.timestamps.slots[self.slot].pools[pool];
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+        // SAFETY: the query was just written; the buffer was declared for a copy and has the room.
+        unsafe {
+            self.device
+                .cmd_copy_query_pool_results(cmd, pool, query, 1, buffer, offset, 8, flags);
+        }
+        Ok(())
+    }
+
+    /// Milliseconds of a tick of the device's clock.
+    pub(crate) fn tick_ms(&self) -> f32 {
+        self.timestamps.period * 1.0e-6
+    }
+
     /// The times of the last finished frame in milliseconds, in the order in which the scopes were
     /// begun, once. Empty on a queue without timestamps. On our own device that is the last
     /// [`Gpu::run`]; on a host's, the frame whose slot [`Gpu::begin_frame`] took over.

@@ -281,6 +281,35 @@ impl Technique {
         names.zip(values).collect()
     }
 
+    /// The same with an option set.
+    ///
+    /// # Errors
+    /// [`TechniqueError::UnknownOption`], which names those that it has, or [`TechniqueError::Value`].
+    pub fn with_option(mut self, option: &str, value: &str) -> Result<Self, TechniqueError> {
+        let known = self.options();
+        let Some(known_option) = known.iter().find(|known| known.name == option) else {
+            let names: Vec<&str> = known.iter().map(|option| option.name).collect();
+            return Err(TechniqueError::UnknownOption {
+                technique: self.name(),
+                option: option.to_string(),
+                known: if names.is_empty() {
+                    "it has none".to_string()
+                } else {
+                    format!("it has {}", names.join(", "))
+                },
+            });
+        };
+        if self.set(option, value).is_none() {
+            return Err(TechniqueError::Value {
+                technique: self.name(),
+                option: known_option.name,
+                value: value.to_string(),
+                values: known_option.values,
+            });
+        }
+        Ok(self)
+    }
+
     /// Sets an option that it has; `None` for a value that the option does not take.
     fn set(&mut self, option: &str, value: &str) -> Option<()> {
         let count = || value.parse::<u32>().ok().filter(|n| (1..=256).contains(n));
@@ -358,38 +387,19 @@ impl std::str::FromStr for Technique {
     fn from_str(text: &str) -> Result<Self, TechniqueError> {
         let (name, options) = text.split_once(':').unwrap_or((text, ""));
         let found = Self::ALL.iter().copied().find(|t| t.name() == name);
-        let Some(mut technique) = found else {
+        let Some(technique) = found else {
             let names: Vec<&str> = Self::ALL.iter().map(|t| t.name()).collect();
             return Err(TechniqueError::Unknown {
                 name: name.to_string(),
                 known: names.join(", "),
             });
         };
-        for option in options.split(',').filter(|option| !option.is_empty()) {
-            let (key, value) = option.split_once('=').unwrap_or((option, ""));
-            let known = technique.options();
-            let Some(option) = known.iter().find(|option| option.name == key) else {
-                let names: Vec<&str> = known.iter().map(|option| option.name).collect();
-                return Err(TechniqueError::UnknownOption {
-                    technique: technique.name(),
-                    option: key.to_string(),
-                    known: if names.is_empty() {
-                        "it has none".to_string()
-                    } else {
-                        format!("it has {}", names.join(", "))
-                    },
-                });
-            };
-            if technique.set(key, value).is_none() {
-                return Err(TechniqueError::Value {
-                    technique: technique.name(),
-                    option: option.name,
-                    value: value.to_string(),
-                    values: option.values,
-                });
-            }
-        }
-        Ok(technique)
+        let options = options.split(',').filter(|option| !option.is_empty());
+        options
+            .map(|option| option.split_once('=').unwrap_or((option, "")))
+            .try_fold(technique, |technique, (key, value)| {
+                technique.with_option(key, value)
+            })
     }
 }
 

@@ -148,6 +148,14 @@ impl PassContext<'_> {
         Ok(())
     }
 
+    /// Writes the device's clock into a buffer that was declared as [`Access::CopyWrite`]: 64 bits,
+    /// once all passes before are done. Writes nothing on a queue without timestamps.
+    pub(crate) fn write_clock(&mut self, id: BufferId, offset: u64) -> Result<(), GpuError> {
+        let used = self.find(id.0.resource, None, |a| a == Access::CopyWrite)?;
+        let buffer = self.handles.buffers[used.resource];
+        self.gpu.write_clock(self.cmd, buffer, offset)
+    }
+
     /// Clears the declared part of a colour image.
     pub fn clear_image(&mut self, id: ImageId, value: [f32; 4]) -> Result<(), GpuError> {
         let used = *self.find(id.0.resource, None, |a| a == Access::Clear)?;

@@ -1,6 +1,6 @@
 //! The passes that find what is between tiles and the light.
 
-use super::{LIST_TEXELS, Lists, NAME, PARTS, POOL_WIDTH, Sizes, masks, part_list, texels};
+use super::{LIST_TEXELS, Lists, Made, NAME, PARTS, POOL_WIDTH, Sizes, masks, part_list, texels};
 use crate::geometry::{TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
@@ -14,6 +14,8 @@ pub(super) struct Making {
     pub params: BufferId,
     pub shafts: ImageId,
     pub sizes: Sizes,
+    /// Of no tile yet.
+    pub estimates: ImageId,
 }
 
 /// Candidates of tiles, between the two passes.
@@ -28,14 +30,15 @@ struct Candidates {
 }
 
 impl Making {
-    /// Declares the passes; returns the lists, and the visibility of the tiles settled so far.
+    /// Declares the passes; returns the lists, the visibility of the tiles settled so far, and the
+    /// estimates.
     pub(super) fn add(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
         parts: TileList,
         visibility: ImageId,
-    ) -> (Lists, ImageId) {
+    ) -> (Lists, Made) {
         let (candidates, visibility) = self.add_candidates(graph, inputs, parts, visibility);
         self.add_entries(graph, inputs, candidates, visibility)
     }
@@ -146,7 +149,7 @@ impl Making {
         inputs: &ShadowInputs<'_>,
         candidates: Candidates,
         visibility: ImageId,
-    ) -> (Lists, ImageId) {
+    ) -> (Lists, Made) {
         let name = &inputs.light_name;
         let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
         let Candidates {
@@ -193,6 +196,7 @@ impl Making {
         let triangles = pass.overwrite(triangles, Access::StorageWrite(Stage::Compute));
         let tasks = pass.overwrite(tasks, Access::StorageWrite(Stage::Compute));
         let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
+        let estimates = pass.write(self.estimates, Access::StorageWrite(Stage::Compute));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -217,6 +221,7 @@ impl Making {
                 Bind::storage_image(18, partial.tiles),
                 Bind::storage_buffer(19, pieces.arguments),
                 Bind::storage_image(20, pieces.tiles),
+                Bind::storage_image(21, estimates),
             ];
             let pipeline = ComputePipelineDesc {
                 constants: vec![(0, shape), (4, sizes.task_entries)],
@@ -235,6 +240,10 @@ impl Making {
             partial,
             pieces,
         };
-        (lists, visibility)
+        let made = Made {
+            visibility,
+            estimates,
+        };
+        (lists, made)
     }
 }

@@ -1,7 +1,7 @@
 //! The passes that work on the lists.
 
-use super::{Lists, NAME, Sizes, texels};
-use crate::geometry::{TILE_SIZE, tile_counts};
+use super::{Lists, Made, NAME, Sizes, texels};
+use crate::geometry::TILE_SIZE;
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferId, Graph, ImageId, PassKind, Stage};
 use crate::shadow::{ShadowInputs, shape_number};
@@ -14,6 +14,11 @@ const MOST_GROUPS: u32 = 65_535;
 /// Runs of nodes that one dispatch works on; it has a workgroup for each and each block of samples.
 pub(super) fn runs_in_dispatch(nodes: u32, sizes: &Sizes) -> u32 {
     (nodes / sizes.run_nodes + 1).min(MOST_GROUPS / sizes.blocks)
+}
+
+/// Words of a tile: two for each pixel and block of samples.
+pub(super) fn words_of_tile(blocks: u32) -> u32 {
+    TILE_SIZE * TILE_SIZE * 2 * blocks
 }
 
 /// `Push` of `shaft_masks/masks.comp`.
@@ -39,6 +44,10 @@ enum Step {
 /// What the passes share.
 pub(super) struct Masks {
     pub sizes: Sizes,
+    /// Added to the names of the passes.
+    pub label: String,
+    /// Tiles that the words have room for.
+    pub slots: u32,
     /// Nodes of the hierarchy.
     pub nodes: u32,
     pub params: BufferId,
@@ -47,19 +56,13 @@ pub(super) struct Masks {
 }
 
 impl Masks {
-    /// Declares the passes; returns the visibility of all tiles.
-    pub(super) fn add(
-        &self,
-        graph: &mut Graph<'_>,
-        inputs: &ShadowInputs<'_>,
-        visibility: ImageId,
-    ) -> ImageId {
+    /// Declares the passes; returns the visibility of the tiles, and what is known of its error.
+    pub(super) fn add(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, made: Made) -> Made {
         let name = &inputs.light_name;
-        let [across, down] = tile_counts(inputs.camera.size());
-        let words = across * down * TILE_SIZE * TILE_SIZE * 2 * self.sizes.blocks;
+        let words = self.slots * words_of_tile(self.sizes.blocks);
         let words = texels(vk::Format::R32_UINT, words);
-        let words = graph.create_image(format!("{NAME}.words {name}"), words);
-        let mut made = (visibility, words);
+        let words = graph.create_image(format!("{NAME}.words{} {name}", self.label), words);
+        let mut made = (made, words);
         let runs = self.nodes / self.sizes.run_nodes + 1;
         let in_one = runs_in_dispatch(self.nodes, &self.sizes) as usize;
         let walks = (0..runs).step_by(in_one).map(Step::Walk);
@@ -73,9 +76,9 @@ impl Masks {
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        (visibility, words): (ImageId, ImageId),
+        (made, words): (Made, ImageId),
         step: Step,
-    ) -> (ImageId, ImageId) {
+    ) -> (Made, ImageId) {
         let name = &inputs.light_name;
         let (ids, gbuffer) = (inputs.ids, inputs.gbuffer);
         let (view_params, part) = inputs.view_params;
@@ -95,7 +98,8 @@ impl Masks {
             Step::Further => (further, tiles.tiles, "further"),
             Step::Walk(_) => (partial.arguments, partial.tiles, "walk"),
         };
-        let mut pass = graph.pass(format!("{NAME}.{what} {name}"), PassKind::Compute);
+        let label = &self.label;
+        let mut pass = graph.pass(format!("{NAME}.{what}{label} {name}"), PassKind::Compute);
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
         let images = [
@@ -115,7 +119,8 @@ impl Masks {
         }
         pass.read(arguments, Access::Indirect);
         pass.read(arguments, Access::Uniform(Stage::Compute));
-        let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
+        let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
+        let estimates = pass.write(made.estimates, Access::StorageReadWrite(Stage::Compute));
         let words = if step == Step::Tiles {
             pass.overwrite(words, Access::StorageWrite(Stage::Compute))
         } else {
@@ -158,6 +163,7 @@ impl Masks {
                 Bind::sampled(15, tasks, nearest),
                 Bind::storage_image(16, words),
                 Bind::sampled(17, triangles, nearest),
+                Bind::storage_image(18, estimates),
             ];
             let pipeline = ComputePipelineDesc {
                 constants,
@@ -166,26 +172,32 @@ impl Masks {
             ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
             ctx.dispatch_indirect(arguments, 0)
         });
-        (visibility, words)
+        let made = Made {
+            visibility,
+            estimates,
+        };
+        (made, words)
     }
 
     fn add_resolve(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        (visibility, words): (ImageId, ImageId),
-    ) -> ImageId {
+        (made, words): (Made, ImageId),
+    ) -> Made {
         let name = &inputs.light_name;
         let (params, shafts) = (self.params, self.shafts);
         let view_depth = inputs.gbuffer.view_depth;
-        let pieces = self.lists.pieces;
-        let mut pass = graph.pass(format!("{NAME}.resolve {name}"), PassKind::Compute);
+        let Lists { pieces, lists, .. } = self.lists;
+        let label = &self.label;
+        let mut pass = graph.pass(format!("{NAME}.resolve{label} {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
         pieces.read(&mut pass);
-        for image in [words, view_depth, shafts] {
+        for image in [words, view_depth, shafts, lists] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
-        let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
+        let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
+        let estimates = pass.write(made.estimates, Access::StorageReadWrite(Stage::Compute));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let pipeline = ComputePipelineDesc::new(&spirv::SHAFT_MASKS_RESOLVE_COMP);
@@ -197,10 +209,15 @@ impl Masks {
                 Bind::storage_image(4, visibility),
                 Bind::sampled(5, view_depth, nearest),
                 Bind::sampled(6, shafts, nearest),
+                Bind::sampled(7, lists, nearest),
+                Bind::storage_image(8, estimates),
             ];
             ctx.bind_compute(&pipeline, &bindings, &[])?;
             pieces.dispatch(ctx)
         });
-        visibility
+        Made {
+            visibility,
+            estimates,
+        }
     }
 }

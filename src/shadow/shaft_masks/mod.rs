@@ -22,12 +22,16 @@
 //! | `further` | what the rest of long lists hides |
 //! | `walk` | what triangles hide that lists had no room for |
 //! | `resolve` | visibility of the tiles of the last two, and where there are more than 64 samples |
+//! | `no_estimates` | the tiles' estimates, which `entries`, `masks` and `resolve` fill in |
+//! | `rounds`, `select` | the tiles that get four times the samples |
+//! | `masks_256` .. `resolve_1024` | their visibility |
 //! | `no_bound`, `bound` | a bound on the error, if anything reads it |
 
 mod bound;
 mod lists;
 mod masks;
 mod options;
+mod refine;
 mod samples;
 
 pub use options::ShaftOptions;
@@ -143,57 +147,85 @@ fn texels(format: vk::Format, count: u32) -> ImageDesc {
     ImageDesc::new(format, POOL_WIDTH, count.div_ceil(POOL_WIDTH).max(1))
 }
 
+/// The visibility so far, and what is known of its error.
+#[derive(Clone, Copy, Debug)]
+struct Made {
+    /// R32F, of the picture's size.
+    visibility: ImageId,
+    /// R32_UINT, four texels a tile: `shaft_masks/estimates.glsl`.
+    estimates: ImageId,
+}
+
 /// Declares the passes.
 pub(super) fn add_passes<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
     options: ShaftOptions,
 ) -> ShadowMask {
+    let [across, down] = tile_counts(inputs.camera.size());
+    let tiles = across * down;
+    let sizes = Sizes::new(tiles, &options, inputs.scene.has_masks());
+    let spent = refine::begin(graph, inputs, &options);
+    let params = add_params(graph, inputs, &sizes, options.side, "params");
+    let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.reach());
+    let (shafts, parts) = add_shafts(graph, inputs, (NAME, PARTS), params, &receivers);
+    let making = lists::Making {
+        params,
+        shafts,
+        sizes,
+        estimates: refine::no_estimates(graph, inputs),
+    };
+    let (lists, made) = making.add(graph, inputs, parts, receivers.visibility);
+    let masks = masks::Masks {
+        sizes,
+        label: String::new(),
+        slots: tiles,
+        nodes: inputs.scene.node_count() as u32,
+        params,
+        shafts,
+        lists,
+    };
+    let made = masks.add(graph, inputs, made);
+    let (made, bound) = refine::Refining::new(masks, options, spent).add(graph, inputs, made);
+    ShadowMask {
+        error_bound: Some(bound),
+        ..ShadowMask::new(made.visibility)
+    }
+}
+
+/// Declares the uniform buffer of masks of `side` rows of samples.
+fn add_params(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    sizes: &Sizes,
+    side: u32,
+    what: &str,
+) -> BufferId {
     let size = inputs.camera.size();
-    let [across, down] = tile_counts(size);
-    let sizes = Sizes::new(across * down, &options, inputs.scene.has_masks());
     let nodes = inputs.scene.node_count() as u32;
     let mut params = ShaftParams {
         counts: [size[0], size[1], nodes, sizes.chunks()],
         pattern: [
-            options.side / BLOCK,
-            sizes.blocks,
+            side / BLOCK,
+            (side / BLOCK).pow(2),
             sizes.edge_rows * POOL_WIDTH,
-            0,
+            level_of(side),
         ],
         rows: [[0.0; 4]; MOST_ROWS],
         strips: [[0.0; 4]; MOST_ROWS],
     };
-    let rows = samples::rows(&inputs.light.shape, options.side);
+    let rows = samples::rows(&inputs.light.shape, side);
     for (at, row) in rows.into_iter().enumerate() {
         params.rows[at] = row.texel();
         params.strips[at] = row.strip_texel(&inputs.light.shape);
     }
-    let buffer = add_uniform(
-        graph,
-        format!("{NAME}.params {}", inputs.light_name),
-        params,
-    );
-    let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.reach());
-    let (shafts, parts) = add_shafts(graph, inputs, (NAME, PARTS), buffer, &receivers);
-    let making = lists::Making {
-        params: buffer,
-        shafts,
-        sizes,
-    };
-    let (lists, visibility) = making.add(graph, inputs, parts, receivers.visibility);
-    let masks = masks::Masks {
-        sizes,
-        nodes,
-        params: buffer,
-        shafts,
-        lists,
-    };
-    let visibility = masks.add(graph, inputs, visibility);
-    ShadowMask {
-        error_bound: Some(masks.add_bound(graph, inputs)),
-        ..ShadowMask::new(visibility)
-    }
+    let name = format!("{NAME}.{what} {}", inputs.light_name);
+    add_uniform(graph, name, params)
+}
+
+/// 1 of 8 rows of samples, one more for twice as many.
+fn level_of(side: u32) -> u32 {
+    (side / BLOCK).ilog2() + 1
 }
 
 /// A list of tiles or their parts.

@@ -1,0 +1,334 @@
+//! More samples for the tiles that need them.
+//!
+//! Every mask tells how far off its pixel is likely to be: a sample that is seen beside one that is
+//! hidden stands for a cell of the light that an edge crosses, and of each such cell a part is
+//! guessed. The squares of these errors add up. The tiles with the largest error get four times the
+//! samples, in rounds, until the picture's is as small as asked for; or those with a pixel whose
+//! proven bound is too large. The tiles' lists are those of the first masks.
+
+use super::bound::no_bound;
+use super::masks::{Masks, runs_in_dispatch, words_of_tile};
+use super::{BLOCK, Lists, Made, NAME, PARTS, POOL_WIDTH, ShaftOptions, Sizes};
+use super::{add_params, part_list, texels};
+use crate::geometry::tile_counts;
+use crate::gpu::{ComputePipelineDesc, spirv};
+use crate::graph::{
+    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
+};
+use crate::shadow::ShadowInputs;
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+
+/// Texels of a tile: `ESTIMATE_TEXELS` in `shaft_masks/estimates.glsl`.
+const ESTIMATE_TEXELS: u32 = 4;
+
+/// Most samples of a tile: their rows.
+const MOST_SIDE: u32 = 32;
+
+/// Words that one round has room for: 32 MiB.
+const ROUND_WORDS: u32 = 1 << 23;
+
+/// Rounds for each number of samples where the time is looked at between them.
+const TIMED_ROUNDS: u32 = 6;
+
+/// Squared error of a pixel for each change between neighbouring samples, in units of one sample's
+/// area squared. Fitted to rays: see [`ShaftOptions::target_error`].
+const CHANGE_SQUARE: f32 = 1.0 / 12.0;
+
+/// `Push` of `shaft_masks/select.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct Push {
+    target_square: f32,
+    bound: f32,
+    scale: f32,
+    work: u32,
+    capacity: u32,
+    rounds: u32,
+    tick_ms: f32,
+    most_ms: f32,
+    parts_down: u32,
+}
+
+/// What tiles are chosen for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Goal {
+    /// Estimated root mean square error of the picture.
+    Error(f32),
+    /// Proven bound on each pixel.
+    Bound(f32),
+}
+
+/// Declares the estimates, of no tile yet.
+pub(super) fn no_estimates(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> ImageId {
+    let name = &inputs.light_name;
+    let [across, down] = tile_counts(inputs.camera.size());
+    let desc = ImageDesc::new(vk::Format::R32_UINT, across * ESTIMATE_TEXELS, down * PARTS);
+    let estimates = graph.create_image(format!("{NAME}.estimates {name}"), desc);
+    let mut pass = graph.pass(format!("{NAME}.no_estimates {name}"), PassKind::Transfer);
+    let estimates = pass.overwrite(estimates, Access::Clear);
+    pass.record(move |ctx| ctx.clear_image(estimates, [0.0; 4]));
+    estimates
+}
+
+/// The rounds after the first masks.
+pub(super) struct Refining {
+    first: Masks,
+    options: ShaftOptions,
+    spent: BufferId,
+}
+
+impl Refining {
+    /// `spent` as [`begin`] made it.
+    pub(super) fn new(first: Masks, options: ShaftOptions, spent: BufferId) -> Self {
+        Self {
+            first,
+            options,
+            spent,
+        }
+    }
+
+    /// Declares the passes; returns the visibility, and its bound.
+    pub(super) fn add(
+        self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        mut made: Made,
+    ) -> (Made, ImageId) {
+        let Self {
+            first,
+            options,
+            mut spent,
+        } = self;
+        let mut bound = no_bound(graph, inputs);
+        let goals = [
+            options.bound.map(Goal::Bound),
+            options.target_error.map(Goal::Error),
+        ];
+        let goals: Vec<Goal> = goals.into_iter().flatten().collect();
+        if goals.is_empty() || options.side == MOST_SIDE {
+            let estimates = made.estimates;
+            (bound, _) = first.add_bound(graph, inputs, bound, estimates);
+            return (made, bound);
+        }
+        // Bounds are made as soon as tiles are chosen by them, else at the end.
+        let by_bound = options.bound.is_some();
+        if by_bound {
+            (bound, made.estimates) = first.add_bound(graph, inputs, bound, made.estimates);
+        }
+        let mut lists = first.lists;
+        let mut all = vec![first];
+        let sides = [2 * BLOCK, MOST_SIDE];
+        for side in sides.into_iter().filter(|side| *side > options.side) {
+            let blocks = (side / BLOCK).pow(2);
+            let sizes = Sizes {
+                blocks,
+                ..all[0].sizes
+            };
+            let label = format!("_{}", side * side);
+            let params = add_params(graph, inputs, &sizes, side, &format!("params{label}"));
+            let [across, down] = tile_counts(inputs.camera.size());
+            let capacity = (ROUND_WORDS / words_of_tile(blocks)).min(across * down * PARTS);
+            let full = (across * down * PARTS).div_ceil(capacity);
+            let rounds = match options.budget_ms {
+                Some(_) => full.max(TIMED_ROUNDS),
+                None => full,
+            };
+            for goal in &goals {
+                for round in 0..rounds {
+                    let Some(last) = all.last() else { continue };
+                    let mut masks = Masks {
+                        sizes,
+                        label: label.clone(),
+                        slots: capacity,
+                        params,
+                        nodes: last.nodes,
+                        shafts: last.shafts,
+                        lists,
+                    };
+                    // Without a clock a round takes what it can.
+                    let left = if options.budget_ms.is_some() {
+                        rounds - round
+                    } else {
+                        1
+                    };
+                    let choice = Choice {
+                        goal: *goal,
+                        options: &options,
+                        rounds: left,
+                    };
+                    (made.estimates, spent) =
+                        choice.add(graph, inputs, &mut masks, made.estimates, spent);
+                    lists.lists = masks.lists.lists;
+                    made = masks.add(graph, inputs, made);
+                    if by_bound {
+                        (bound, made.estimates) =
+                            masks.add_bound(graph, inputs, bound, made.estimates);
+                    }
+                    all.push(masks);
+                }
+            }
+        }
+        if !by_bound {
+            let mut estimates = made.estimates;
+            for masks in &mut all {
+                // What changed in them since is not looked at.
+                masks.lists.lists = lists.lists;
+                (bound, estimates) = masks.add_bound(graph, inputs, bound, estimates);
+            }
+        }
+        (made, bound)
+    }
+}
+
+/// Bytes of `Spent` in `shaft_masks/select.comp`.
+const SPENT_BYTES: u64 = 24;
+
+/// Where in it the clock stands at the beginning, and later.
+const BEGIN_OFFSET: u64 = 8;
+const NOW_OFFSET: u64 = 16;
+
+/// Declares what is spent: nothing yet. The clock begins here.
+pub(super) fn begin(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    options: &ShaftOptions,
+) -> BufferId {
+    let name = &inputs.light_name;
+    let desc = BufferDesc { size: SPENT_BYTES };
+    let spent = graph.create_buffer(format!("{NAME}.spent {name}"), desc);
+    let mut pass = graph.pass(format!("{NAME}.rounds {name}"), PassKind::Transfer);
+    let spent = pass.overwrite(spent, Access::Clear);
+    pass.record(move |ctx| ctx.update_buffer(spent, 0, &[0; SPENT_BYTES as usize]));
+    match options.budget_ms {
+        Some(_) => add_clock(graph, inputs, spent, BEGIN_OFFSET),
+        None => spent,
+    }
+}
+
+fn add_clock(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    spent: BufferId,
+    offset: u64,
+) -> BufferId {
+    let name = &inputs.light_name;
+    let mut pass = graph.pass(format!("{NAME}.clock {name}"), PassKind::Transfer);
+    let spent = pass.write(spent, Access::CopyWrite);
+    pass.record(move |ctx| ctx.write_clock(spent, offset));
+    spent
+}
+
+/// How a round's tiles are chosen.
+struct Choice<'o> {
+    goal: Goal,
+    options: &'o ShaftOptions,
+    /// This round and those after it that share the tiles.
+    rounds: u32,
+}
+
+impl Choice<'_> {
+    /// Declares the passes; fills in the lists of the masks. Returns the estimates and what is spent.
+    fn add(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        masks: &mut Masks,
+        estimates: ImageId,
+        spent: BufferId,
+    ) -> (ImageId, BufferId) {
+        let spent = match self.options.budget_ms {
+            Some(_) => add_clock(graph, inputs, spent, NOW_OFFSET),
+            None => spent,
+        };
+        let (name, label) = (&inputs.light_name, masks.label.clone());
+        let [across, down] = tile_counts(inputs.camera.size());
+        let sizes = masks.sizes;
+        let mut selected = part_list(graph, inputs, &format!("selected{label}"));
+        let mut partial = part_list(graph, inputs, &format!("partial{label}"));
+        let sixteen = BufferDesc { size: 16 };
+        let further = graph.create_buffer(format!("{NAME}.further{label} {name}"), sixteen);
+        let mut pass = graph.pass(format!("{NAME}.clear{label} {name}"), PassKind::Transfer);
+        selected.clear(&mut pass);
+        partial.clear(&mut pass);
+        let further = pass.overwrite(further, Access::Clear);
+        let runs = runs_in_dispatch(masks.nodes, &sizes);
+        let arguments = [
+            (selected.arguments, [0u32, 1, sizes.blocks, 0]),
+            (further, [0, 1, sizes.blocks, 0]),
+            (partial.arguments, [0, 1, runs * sizes.blocks, 0]),
+        ];
+        pass.record(move |ctx| {
+            for (buffer, values) in arguments {
+                ctx.update_buffer(buffer, 0, bytemuck::cast_slice(&values))?;
+            }
+            Ok(())
+        });
+
+        let tasks = texels(
+            vk::Format::R32G32B32A32_UINT,
+            sizes.pool_rows * POOL_WIDTH / sizes.task_entries,
+        );
+        let tasks = graph.create_image(format!("{NAME}.tasks{label} {name}"), tasks);
+        let params = masks.params;
+        let mut pass = graph.pass(format!("{NAME}.select{label} {name}"), PassKind::Compute);
+        pass.read(params, Access::Uniform(Stage::Compute));
+        let estimates = pass.write(estimates, Access::StorageReadWrite(Stage::Compute));
+        let lists = pass.write(masks.lists.lists, Access::StorageReadWrite(Stage::Compute));
+        selected.fill(&mut pass);
+        partial.fill(&mut pass);
+        let further = pass.write(further, Access::StorageReadWrite(Stage::Compute));
+        let tasks = pass.overwrite(tasks, Access::StorageWrite(Stage::Compute));
+        let spent = pass.write(spent, Access::StorageReadWrite(Stage::Compute));
+        let (target_square, bound) = match self.goal {
+            Goal::Error(target) => (target * target, 0.0),
+            Goal::Bound(bound) => (-1.0, bound),
+        };
+        let samples = (BLOCK * BLOCK) as f32;
+        let mut push = Push {
+            target_square,
+            bound,
+            scale: CHANGE_SQUARE / (samples * samples),
+            work: self.options.budget_work.unwrap_or(u32::MAX),
+            capacity: masks.slots,
+            rounds: self.rounds,
+            tick_ms: 0.0,
+            most_ms: self.options.budget_ms.unwrap_or(f32::MAX),
+            parts_down: down * PARTS,
+        };
+        let _ = across;
+        let task_entries = sizes.task_entries;
+        pass.record(move |ctx| {
+            push.tick_ms = ctx.gpu().tick_ms();
+            let bindings = [
+                Bind::uniform(0, params),
+                Bind::storage_image(1, estimates),
+                Bind::storage_image(2, lists),
+                Bind::storage_buffer(3, selected.arguments),
+                Bind::storage_image(4, selected.tiles),
+                Bind::storage_buffer(5, further),
+                Bind::storage_image(6, tasks),
+                Bind::storage_buffer(7, partial.arguments),
+                Bind::storage_image(8, partial.tiles),
+                Bind::storage_buffer(9, spent),
+            ];
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(4, task_entries)],
+                ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_SELECT_COMP)
+            };
+            ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
+            ctx.dispatch([1, 1, 1]);
+            Ok(())
+        });
+        masks.lists = Lists {
+            tiles: selected,
+            lists,
+            further,
+            tasks,
+            partial,
+            pieces: selected,
+            ..masks.lists
+        };
+        (estimates, spent)
+    }
+}

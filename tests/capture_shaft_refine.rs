@@ -1,0 +1,156 @@
+//! More samples for the tiles of `shaft-masks` that need them.
+#![cfg(feature = "cli")]
+
+mod support;
+
+use antumbra::capture::{FrameRenderer, FrameRequest, Samples};
+use antumbra::scene::{LoadOptions, Scene};
+use std::path::Path;
+
+const SIZE: usize = 64;
+const TILE: usize = 8;
+
+/// Visibility of the first light of a scene.
+struct Views {
+    renderer: FrameRenderer<'static>,
+    scene: Scene,
+}
+
+impl Views {
+    fn of(name: &str) -> Self {
+        let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
+        let scene = Scene::load(&assets.join(name), &LoadOptions::default()).unwrap();
+        let renderer = FrameRenderer::owning(support::gpu(), scene.clone()).unwrap();
+        Self { renderer, scene }
+    }
+
+    fn see(&mut self, options: &str) -> Vec<f32> {
+        self.see_with(options, &[]).0
+    }
+
+    fn see_with(&mut self, options: &str, images: &[&str]) -> (Vec<f32>, Vec<Vec<f32>>) {
+        let request = FrameRequest {
+            camera: self.scene.select_camera(None).unwrap(),
+            size: [SIZE as u32; 2],
+            lights: vec![0],
+            technique: format!("shaft-masks:{options}").parse().unwrap(),
+        };
+        let mut frame = self.renderer.render_with_images(&request, images).unwrap();
+        let planes = frame.images.iter().map(|image| match &image.planes[0] {
+            Samples::Float(values) => values.clone(),
+            other => panic!("{other:?}"),
+        });
+        (frame.lights.remove(0).visibility, planes.collect())
+    }
+
+    fn end(self) {
+        support::assert_no_messages(&self.renderer.destroy().unwrap());
+    }
+}
+
+/// Of each tile the first of the pictures that it is equal to.
+fn sources(image: &[f32], pictures: &[&[f32]]) -> Vec<Option<usize>> {
+    let across = SIZE / TILE;
+    let tiles = (0..across * across).map(|tile| {
+        let (x, y) = (tile % across * TILE, tile / across * TILE);
+        let pixels = || (0..TILE * TILE).map(|i| (y + i / TILE) * SIZE + x + i % TILE);
+        pictures
+            .iter()
+            .position(|picture| pixels().all(|i| picture[i] == image[i]))
+    });
+    tiles.collect()
+}
+
+/// Over the pixels that are partly lit.
+fn rms(image: &[f32], truth: &[f32]) -> f64 {
+    let pairs = image.iter().zip(truth);
+    let partly = pairs.filter(|(_, t)| (0.005..0.995).contains(*t));
+    let (sum, count) = partly.fold((0.0, 0.0), |(sum, count), (v, t)| {
+        (sum + f64::from(v - t).powi(2), count + 1.0)
+    });
+    f64::sqrt(sum / count)
+}
+
+#[test]
+fn tiles_get_more_samples_where_they_need_them() {
+    let _one = support::serial();
+    let mut views = Views::of("fences.gltf");
+    let few = views.see("target-error=none");
+    let more = views.see("target-error=none,samples=256");
+    let most = views.see("target-error=none,samples=1024");
+    assert_eq!(views.see("target-error=0"), most, "all tiles");
+    assert_eq!(views.see("target-error=1"), few, "none");
+
+    let pictures = [&few[..], &more, &most];
+    let all = rms(&few, &most);
+    for target in [0.016, 0.008] {
+        let image = views.see(&format!("target-error={target}"));
+        let sources = sources(&image, &pictures);
+        let count = |source| sources.iter().filter(|s| **s == Some(source)).count();
+        let counts = [count(0), count(1), count(2)];
+        let reached = rms(&image, &most);
+        println!("{target}: {reached:.4} of {all:.4}, tiles {counts:?} by samples");
+        assert!(
+            sources.iter().all(Option::is_some),
+            "each tile is one of the three"
+        );
+        assert!(reached < all && reached < 1.5 * target, "{reached}");
+        assert!(count(1) > 0 && counts[0] + counts[1] > 0, "{counts:?}");
+    }
+    views.end();
+}
+
+#[test]
+fn budgets_and_bounds_hold() {
+    let _one = support::serial();
+    let mut views = Views::of("lights.gltf");
+    let few = views.see("target-error=none");
+    let most = views.see("target-error=none,samples=1024");
+    let none = views.see("target-error=0,budget-work=0");
+    assert_eq!(none, few, "nothing may be done");
+    let [little, more] = ["1000", "20000"].map(|work| {
+        let options = format!("target-error=0,budget-work={work}");
+        let image = views.see(&options);
+        assert_eq!(views.see(&options), image, "the same again");
+        image
+    });
+    let off = [&few, &little, &more, &most].map(|image| rms(image, &most));
+    println!("errors with more and more work: {off:?}");
+    assert!(off.is_sorted_by(|a, b| a > b), "{off:?}");
+
+    assert_eq!(views.see("target-error=0,budget-ms=0"), few, "no time");
+    assert_eq!(
+        views.see("target-error=0,budget-ms=1000000"),
+        most,
+        "all the time"
+    );
+
+    let bound_of = |views: &mut Views, options: &str| {
+        let (_, images) = views.see_with(options, &["visibility_bound"]);
+        images.into_iter().next().unwrap()
+    };
+    let coarse = bound_of(&mut views, "target-error=none");
+    let fine = bound_of(&mut views, "target-error=none,samples=1024");
+    let within = bound_of(&mut views, "target-error=none,bound=0.15");
+    let over = |bounds: &[f32]| bounds.iter().filter(|b| **b > 0.15).count();
+    println!(
+        "above the bound: {} first, {} at most samples, {} then",
+        over(&coarse),
+        over(&fine),
+        over(&within)
+    );
+    assert!(over(&coarse) > 20, "there is something to do");
+    // A pixel is above it only where 1024 samples are.
+    for (i, bound) in within.iter().enumerate() {
+        assert!(
+            *bound <= 0.15 || *bound == fine[i],
+            "pixel {i}: {bound}, {}",
+            fine[i]
+        );
+    }
+    assert!(
+        within.iter().zip(&fine).any(|(b, fine)| b > fine),
+        "no more than asked for"
+    );
+    views.end();
+}

@@ -19,7 +19,7 @@ struct Views {
 impl Views {
     fn of(name: &str) -> Self {
         let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
-        let scene = Scene::load(&assets.join(name), &LoadOptions::default()).unwrap();
+        let scene = Scene::load(assets.join(name), &LoadOptions::default()).unwrap();
         let renderer = FrameRenderer::owning(support::gpu(), scene.clone()).unwrap();
         Self { renderer, scene }
     }

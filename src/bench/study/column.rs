@@ -16,6 +16,7 @@ use super::super::results::{Entry, Pass, ReferenceEntry};
 /// | `mean` | mean visibility over the penumbra |
 /// | `frame_ms`, `visibility_ms` | medians, milliseconds |
 /// | `ratio`, `visibility_ratio` | these two over those of `hard`, measured in turn in the same run |
+/// | `times:LABEL` | `visibility_ms` over that of another technique or rival of the table |
 /// | `load_ms`, `first_frame_ms` | before the measured rounds, milliseconds |
 /// | `passes:PATTERN` | time on the device of all passes with such names, milliseconds; `*` stands for any text, but never between two spaces |
 /// | `count:PATTERN` | number of those passes, without the left-out ones |
@@ -49,6 +50,8 @@ enum Term {
     Passes(String),
     Count(String),
     Counter(String),
+    /// Time over that of the entry of this label.
+    Times(String),
 }
 
 macro_rules! names {
@@ -93,7 +96,7 @@ names! {
 #[allow(missing_docs)]
 pub enum ColumnError {
     #[error(
-        "no column `{name}`; there is {}, passes:PATTERN, count:PATTERN, counter:NAME, and numbers",
+        "no column `{name}`; there is {}, passes:PATTERN, count:PATTERN, counter:NAME, times:LABEL, and numbers",
         known()
     )]
     Unknown { name: String },
@@ -159,6 +162,7 @@ fn parse_term(text: &str) -> Result<Term, ColumnError> {
             "passes" => return Ok(Term::Passes(of.into())),
             "count" => return Ok(Term::Count(of.into())),
             "counter" => return Ok(Term::Counter(of.into())),
+            "times" => return Ok(Term::Times(of.into())),
             _ => {}
         }
     }
@@ -176,6 +180,8 @@ pub(super) struct Sources<'a> {
     pub(super) reference: &'a ReferenceEntry,
     /// The same scene and light with `hard`.
     pub(super) hard: Option<&'a Entry>,
+    /// All of the same scene and light.
+    pub(super) all: &'a [&'a Entry],
 }
 
 /// How numbers of a column are written.
@@ -194,6 +200,17 @@ impl Column {
         is_ratio(&self.first) || self.rest.iter().any(|(_, term)| is_ratio(term))
     }
 
+    /// Labels that values are over.
+    pub(super) fn labels(&self) -> impl Iterator<Item = &str> {
+        let rest = self.rest.iter().map(|(_, term)| term);
+        std::iter::once(&self.first)
+            .chain(rest)
+            .filter_map(|term| match term {
+                Term::Times(label) => Some(label.as_str()),
+                _ => None,
+            })
+    }
+
     pub(super) fn kind(&self) -> Kind {
         if !self.rest.is_empty() {
             return Kind::Other;
@@ -201,6 +218,7 @@ impl Column {
         match &self.first {
             Term::Counter(_) | Term::Count(_) => Kind::Count,
             Term::Number(_) | Term::Passes(_) => Kind::Other,
+            Term::Times(_) => Kind::Ratio,
             Term::Named(name) => match name {
                 Name::Rmse
                 | Name::Bias
@@ -247,6 +265,10 @@ impl Term {
             Self::Named(Name::Triangles) => counter("triangles"),
             Self::Named(name) => name.value(from),
             Self::Counter(name) => counter(name),
+            Self::Times(label) => {
+                let other = from.all.iter().find(|entry| entry.label == *label)?;
+                Some(visibility_ms(from.entry)? / visibility_ms(other)?)
+            }
             Self::Passes(pattern) => {
                 let passes = matching(pattern, &from.entry.passes);
                 let times: Option<Vec<f64>> = passes.iter().map(|pass| pass.gpu_ms).collect();
@@ -269,11 +291,11 @@ impl Name {
             entry,
             reference,
             hard,
+            ..
         } = from;
         let error = entry.error;
         let penumbra = error.map(|error| error.penumbra);
         let frame = |entry: &Entry| entry.frame_ms.map(|spread| spread.median);
-        let visibility = |entry: &Entry| entry.visibility_ms.map(|spread| spread.median);
         match self {
             Self::Rmse => Some(penumbra?.rmse),
             Self::Bias => Some(penumbra?.bias),
@@ -286,9 +308,9 @@ impl Name {
             Self::LitCalledUmbra => Some(error?.lit_called_umbra),
             Self::Mean => entry.penumbra_mean,
             Self::FrameMs => frame(entry),
-            Self::VisibilityMs => visibility(entry),
+            Self::VisibilityMs => visibility_ms(entry),
             Self::Ratio => Some(frame(entry)? / frame(hard?)?),
-            Self::VisibilityRatio => Some(visibility(entry)? / visibility(hard?)?),
+            Self::VisibilityRatio => Some(visibility_ms(entry)? / visibility_ms(hard?)?),
             Self::LoadMs => Some(entry.setup_ms?.load),
             Self::FirstFrameMs => entry.setup_ms?.first_frame,
             // Taken from the counters before.
@@ -298,6 +320,10 @@ impl Name {
             Self::MemoryMib => Some(entry.peak_bytes?.device as f64 / f64::from(1 << 20)),
         }
     }
+}
+
+fn visibility_ms(entry: &Entry) -> Option<f64> {
+    entry.visibility_ms.map(|spread| spread.median)
 }
 
 fn matching<'a>(pattern: &str, passes: &'a [Pass]) -> Vec<&'a Pass> {

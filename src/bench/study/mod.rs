@@ -235,7 +235,14 @@ impl Table {
             let mut earlier = all[..*at].iter();
             earlier.any(|other| other.method == contender.method)
         });
-        twice.map(|(_, contender)| format!("`{}` is measured twice", contender.label))
+        if let Some((_, contender)) = twice {
+            return Some(format!("`{}` is measured twice", contender.label));
+        }
+        let measured = all.iter().map(|contender| contender.label.as_str());
+        let known: Vec<&str> = measured.chain(self.missing_rivals()).collect();
+        let mut compared = self.columns.iter().flat_map(|column| column.value.labels());
+        let unknown = compared.find(|label| !known.contains(label))?;
+        Some(format!("`times:{unknown}`: the table has no `{unknown}`"))
     }
 
     /// Those of `rivals` that this build has.
@@ -376,6 +383,10 @@ mod tests {
             (
                 format!("{TABLE}{good}{TABLE}{good}"),
                 "two tables have this name",
+            ),
+            (
+                format!("{TABLE}techniques = [\"pcss\"]\ncolumns = [\"times:hard\"]\n"),
+                "the table has no `hard`",
             ),
             (
                 format!("{TABLE}techniques = [\"soft\"]\ncolumns = [\"rmse\"]\n"),

@@ -96,6 +96,7 @@ impl<'a> Group<'a> {
             entry,
             reference: self.reference,
             hard: entries.find(is_hard),
+            all: &self.entries,
         };
         columns.iter().map(|column| column.value(from)).collect()
     }
@@ -367,19 +368,20 @@ mod tests {
 
     #[test]
     fn a_table_has_what_differs_and_notes_what_failed() {
-        let study =
-            study("columns = [\"rmse as a|b\", \"passes:map* - 1 / 2\", \"visibility_ratio\"]\n");
+        let study = study(
+            "columns = [\"rmse as a|b\", \"passes:map* - 1 / 2\", \"visibility_ratio\", \"2 * times:rays:4\"]\n",
+        );
         let page = page(&study, &[measured()]);
         for part in [
             "# T\n\nAbout.\n",
             "\n## A\n\nReproduces: Table 1.\n",
             "\nScene <b>&; light \"lamp\"; size 4x4; 16 light samples",
-            "\n| light \u{d7} | technique | a\\|b | passes:map* - 1 / 2 | visibility_ratio |\n\
-             | --- | --- | ---: | ---: | ---: |\n\
-             | 1 | `hard` | 0.2500 | 0.500 | 1.00 |\n\
-             | 1 | `rays:4` | failed | \u{2013} | \u{2013} |\n\
-             | 2 | `hard` | 0.2500 | 0.500 | 1.00 |\n\
-             | 2 | `rays:4` | 0.2500 | \u{2013} | 1.00 |\n",
+            "\n| light \u{d7} | technique | a\\|b | passes:map* - 1 / 2 | visibility_ratio | 2 * times:rays:4 |\n\
+             | --- | --- | ---: | ---: | ---: | ---: |\n\
+             | 1 | `hard` | 0.2500 | 0.500 | 1.00 | \u{2013} |\n\
+             | 1 | `rays:4` | failed | \u{2013} | \u{2013} | \u{2013} |\n\
+             | 2 | `hard` | 0.2500 | 0.500 | 1.00 | 2.00 |\n\
+             | 2 | `rays:4` | 0.2500 | \u{2013} | 1.00 | 2.00 |\n",
             "\nFailed: <b>&, \"lamp\", 4x4, `rays:4`: signal <11>\n",
         ] {
             assert!(page.contains(part), "{part:?} in {page}");

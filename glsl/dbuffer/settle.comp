@@ -1,10 +1,11 @@
 #version 460
 // Tiles that no silhouette, no triangle with holes and no surface's own plane stands before see all of the light or nothing of
-// it: what sees its centre. The others are listed.
+// it: what sees its centre, unless a surface cuts through the light. The others are listed.
 
 #include "common/tiles.glsl"
 #include "dbuffer/lists.glsl"
 #include "dbuffer/params.glsl"
+#include "dbuffer/through.glsl"
 #include "shaft_masks/shaft.glsl"
 
 layout(local_size_x = 64) in;
@@ -24,6 +25,9 @@ layout(set = 0, binding = 6, std430) buffer PenumbraArguments {
 };
 layout(set = 0, binding = 7, r32ui) uniform writeonly uimage2D penumbra_list;
 layout(set = 0, binding = 8, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 9, std140) uniform ThroughBlock {
+    Through through;
+};
 
 vec4 fetch_triangle_texel(uint texel) {
     return vec4(0.0);
@@ -46,7 +50,7 @@ void main() {
     uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
     uvec2 tile = tile_of_entry(entry, tiles);
     Shaft shaft = fetch_shaft(tile);
-    bool settled = shaft.low.w > 0.0;
+    bool settled = shaft.low.w > 0.0 && through.cut.x == 0u;
     for (uint block = 0u; block < params.sizes.y; ++block) {
         uvec4 found = texelFetch(lists, list_place(block, entry, tiles.x * tiles.y), 0);
         settled = settled && found.y == 0u && found.z == found.w;

@@ -6,6 +6,7 @@
 #include "common/view_params.glsl"
 #include "dbuffer/lists.glsl"
 #include "dbuffer/params.glsl"
+#include "dbuffer/through.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -33,6 +34,9 @@ layout(set = 0, binding = 16, std140) uniform Arguments {
     TileArguments arguments;
 };
 layout(set = 0, binding = 17) uniform usampler2D list;
+layout(set = 0, binding = 18, std140) uniform ThroughBlock {
+    Through through;
+};
 
 // 1 where triangles of the scene may have holes.
 layout(constant_id = 2) const uint MASKED = 0u;
@@ -74,6 +78,10 @@ const float POSITION_ROUNDING = 1.0 / 2097152.0;
 
 // Layers along the light in which the estimate below holds on to the edges' own number.
 const float FEW = 1.0e-5;
+
+// Rays that a receiver may send to tell how many layers there are, and samples that may be off by rounding.
+const uint MOST_RAYS = 4u;
+const uint FEW_SAMPLES = 2u;
 
 // 1 where a sample is above the receiver's plane.
 vec4 above_plane(vec3 horizon, uint i) {
@@ -138,6 +146,49 @@ void add_cutouts(uint tile, uint tiles, CoverageReceiver r, inout uvec2 seen) {
     }
 }
 
+// The part of the light that rays to its samples reach, of what is above the receiver's plane.
+float traced(CoverageReceiver r, vec3 horizon, bool whole, uint tile, uint tiles) {
+    uvec2 seen = uvec2(0u);
+    float weight = 0.0;
+    for (uint i = 0u; i < 4u * FOURS; ++i) {
+        vec2 place = vec2(params.samples[2u * (i / 4u)][i % 4u], params.samples[2u * (i / 4u) + 1u][i % 4u]);
+        if (whole || dot(horizon, vec3(place, 1.0)) > 0.0) {
+            weight += 1.0;
+            bool blocked = ray_is_blocked(r.p, to_light_place(r, place), false, params.counts.z, r.rounding_m);
+            uint bit = blocked ? 0u : 1u << (i & 31u);
+            seen |= i < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
+        }
+    }
+    if (MASKED != 0u) {
+        add_cutouts(tile, tiles, r, seen);
+    }
+    return weight > 0.0 ? float(bitCount(seen.x) + bitCount(seen.y)) / weight : 1.0;
+}
+
+// Samples of the light with the same number of layers before them.
+struct Level {
+    float layers;
+    uint samples;
+    vec2 place; // the first of them
+};
+
+// The fewest layers that are at least as many as asked for.
+Level next_level(Coverage found, bool whole, vec3 horizon, float least) {
+    Level level = Level(1.0e9, 0u, vec2(0.0));
+    for (uint i = 0u; i < FOURS; ++i) {
+        vec4 layers = whole ? found.layers[i] : mix(vec4(1.0e9), found.layers[i], above_plane(horizon, i));
+        for (uint j = 0u; j < 4u; ++j) {
+            float here = layers[j] >= least ? layers[j] : 1.0e9;
+            bool fewer = here < level.layers;
+            vec2 place = vec2(params.samples[2u * i][j], params.samples[2u * i + 1u][j]);
+            level.place = fewer ? place : level.place;
+            level.samples = fewer ? 1u : level.samples + (here < 1.0e9 && here == level.layers ? 1u : 0u);
+            level.layers = min(level.layers, here);
+        }
+    }
+    return level;
+}
+
 float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
     uint id = texelFetch(ids, ivec2(pixel), 0).x;
@@ -157,6 +208,9 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     CoverageReceiver r = coverage_receiver(view.light, p, n, rounding_m);
     vec3 horizon = vec3(dot(n, r.axis_u), dot(n, r.axis_v), dot(n, r.center));
     bool whole = above >= 1.0;
+    if (LIGHT_SHAPE != LIGHT_SUN && through.cut.x != 0u) {
+        return above * traced(r, horizon, whole, tile, tiles);
+    }
     bool center_above = horizon.z > 0.0;
     if (!center_above) {
         // The highest point of the light.
@@ -175,36 +229,38 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     found.beyond = vec2(0.0);
     add_edges(tile, tiles, r, found);
 
-    // The sample with the fewest layers before it.
-    float fewest = 1.0e9;
-    vec2 target = r.from;
-    for (uint i = 0u; i < FOURS; ++i) {
-        vec4 layers = whole ? found.layers[i] : mix(vec4(1.0e9), found.layers[i], above_plane(horizon, i));
-        for (uint j = 0u; j < 4u; ++j) {
-            bool fewer = layers[j] < fewest;
-            fewest = fewer ? layers[j] : fewest;
-            target = fewer ? vec2(params.samples[2u * i][j], params.samples[2u * i + 1u][j]) : target;
-        }
-    }
+    Level level = next_level(found, whole, horizon, -1.0e9);
+    float fewest = level.layers;
+    vec2 target = level.place;
     if (fewest > 0.0) {
-        // It lies between samples.
+        // The fewest layers lie between samples.
         fewest = 0.0;
         target = r.from;
     }
     bool center_seen = center_above && texelFetch(hard, ivec2(pixel), 0).x > 0.0;
     // Where the centre is seen and nothing has fewer layers, there are none before the centre. Else a ray
     // to where there are fewest tells whether that is none. If it is not, a part of the light between
-    // the samples may have fewer still.
+    // the samples may have fewer still, or rounding has taken a layer too many off one sample.
     bool known = center_seen && fewest == 0.0;
     bool again = whole && fewest == 0.0 && found.lighter > 0.0;
-    for (uint i = 0u; i < 2u && !known; ++i) {
+    for (uint i = 0u; i < MOST_RAYS && !known; ++i) {
         known = !ray_is_blocked(p, to_light_place(r, target), sun, params.counts.z, rounding_m);
-        if (!known && again) {
+        if (!known && center_seen) {
+            fewest = 0.0;
+            known = true;
+        } else if (!known && level.samples <= FEW_SAMPLES && level.layers <= 0.0) {
+            level = next_level(found, whole, horizon, level.layers + 0.5);
+            fewest = level.layers;
+            target = level.place;
+            again = false;
+            i = level.samples > 0u ? i : MOST_RAYS;
+        } else if (!known && again) {
             again = false;
             fewest = -found.fewer;
             target = found.beyond;
+            level.samples = FEW_SAMPLES + 1u;
         } else {
-            i = 1u;
+            i = MOST_RAYS;
         }
     }
     if (!known) {

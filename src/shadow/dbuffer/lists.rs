@@ -6,9 +6,9 @@ use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
     Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
 };
-use crate::shadow::ShadowInputs;
 use crate::shadow::receivers::Receivers;
 use crate::shadow::silhouettes::Silhouettes;
+use crate::shadow::{ShadowInputs, shape_number};
 use ash::vk;
 
 /// Silhouettes of a box of each level, and of a block: `dbuffer/lists.glsl`.
@@ -78,6 +78,8 @@ pub(super) struct Found {
     pub lists: ImageId,
     /// Tiles with edges.
     pub tiles: TileList,
+    /// `Through` in `dbuffer/through.glsl`.
+    pub through: BufferId,
 }
 
 /// An image of so many texels, in rows.
@@ -262,10 +264,12 @@ impl Lists {
         let cleared = penumbra;
         pass.record(move |ctx| cleared.record_clear(ctx));
 
+        let through = add_through(graph, inputs);
         let (params, shafts, hard) = (self.params, self.shafts, self.hard);
         let tiles = self.receivers.list;
         let mut pass = graph.pass(format!("{NAME}.settle {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
+        pass.read(through, Access::Uniform(Stage::Compute));
         for image in [shafts, lists, hard] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
@@ -285,6 +289,7 @@ impl Lists {
                 Bind::storage_buffer(6, penumbra.arguments),
                 Bind::storage_image(7, penumbra.tiles),
                 Bind::storage_image(8, visibility),
+                Bind::uniform(9, through),
             ];
             let shader = &spirv::DBUFFER_SETTLE_COMP;
             ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
@@ -292,6 +297,50 @@ impl Lists {
             Ok(())
         });
         let tiles = penumbra;
-        (Found { pool, lists, tiles }, visibility)
+        let found = Found {
+            pool,
+            lists,
+            tiles,
+            through,
+        };
+        (found, visibility)
     }
+}
+
+/// Whether a surface cuts through the light. Nothing cuts a sun.
+fn add_through(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> BufferId {
+    let name = &inputs.light_name;
+    let through = graph.create_buffer(format!("{NAME}.through {name}"), BufferDesc { size: 16 });
+    if inputs.light.shape.is_sun() {
+        let mut pass = graph.pass(format!("{NAME}.through {name}"), PassKind::Transfer);
+        let through = pass.overwrite(through, Access::Clear);
+        pass.record(move |ctx| ctx.update_buffer(through, 0, &[0; 16]));
+        return through;
+    }
+    let (view_params, part) = inputs.view_params;
+    let (triangles, hierarchy) = (inputs.ids.triangles, inputs.ids.hierarchy);
+    let shape = shape_number(&inputs.light.shape);
+    let nodes = inputs.scene.node_count() as u32;
+    let mut pass = graph.pass(format!("{NAME}.through {name}"), PassKind::Compute);
+    pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+    pass.read(triangles, Access::Sampled(Stage::Compute));
+    pass.read(hierarchy, Access::Sampled(Stage::Compute));
+    let through = pass.overwrite(through, Access::StorageWrite(Stage::Compute));
+    pass.record(move |ctx| {
+        let nearest = SamplerDesc::nearest();
+        let bindings = [
+            Bind::uniform(0, view_params).part(part),
+            Bind::sampled(1, triangles, nearest),
+            Bind::sampled(2, hierarchy, nearest),
+            Bind::storage_buffer(3, through),
+        ];
+        let pipeline = ComputePipelineDesc {
+            constants: vec![(0, shape)],
+            ..ComputePipelineDesc::new(&spirv::DBUFFER_THROUGH_COMP)
+        };
+        ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&nodes))?;
+        ctx.dispatch([1, 1, 1]);
+        Ok(())
+    });
+    through
 }

@@ -19,23 +19,25 @@
 //! | `start`, `tiles`, `shafts` | tiles that some of the light is above, what is between both |
 //! | `lists` | the edges of each tile |
 //! | `cutouts` | its triangles with holes, if the scene has any: these hide samples of the light |
+//! | `through` | whether a surface cuts through the light: then rays to samples of it decide |
 //! | `settle` | tiles without edges; a list of the others |
 //! | `visibility` | visibility of the others |
 
+mod buffer;
 mod lists;
 mod options;
 mod samples;
 
-pub use options::DbufferOptions;
+pub use options::{Buffer, Curve, DbufferOptions, Keep};
 
 use super::receivers::add_receivers;
 use super::shaft_masks::add_shafts;
 use super::silhouettes::{SilhouetteRule, add_silhouettes};
 use super::uniform::add_uniform;
-use super::{ShadowInputs, ShadowMask, hard, shape_number};
+use super::{LightParams, ShadowInputs, ShadowMask, ViewParams, hard, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, Graph, ImageId, PassKind, Stage};
-use crate::light::{LightShape, ShapeKind};
+use crate::graph::{Access, Bind, BufferPart, Graph, ImageId, PassKind, Stage};
+use crate::light::{AreaLight, LightShape, ShapeKind};
 use bytemuck::{Pod, Zeroable};
 use lists::{Lists, Sizes};
 
@@ -72,6 +74,19 @@ pub(super) fn add_passes<'f>(
         let image = format!("visibility {name}");
         return ShadowMask::new(hard::add_hard(graph, inputs, NAME, image));
     }
+    if let Some(light) = as_disk(&inputs.light, &options) {
+        let inputs = lit_by(graph, inputs, light);
+        return add_passes(graph, &inputs, options);
+    }
+    if options.buffer != Buffer::Lists {
+        let [width, height] = inputs.camera.size();
+        let params = DbufferParams {
+            counts: [width, height, 0, 0],
+            samples: samples::texels(options.samples, false),
+            sizes: [0; 4],
+        };
+        return buffer::add_buffer(graph, inputs, &options, params);
+    }
     let base = format!("{NAME}.hard");
     let hard = hard::add_hard(graph, inputs, &base, format!("{base} {name}"));
     let size = inputs.camera.size();
@@ -106,6 +121,44 @@ pub(super) fn add_passes<'f>(
     add_visibility(graph, inputs, &options, &tools, &found, visibility)
 }
 
+/// The disk of the same area, where a rectangle shall count as that: a D-buffer knows disks alone.
+fn as_disk(light: &AreaLight, options: &DbufferOptions) -> Option<AreaLight> {
+    let LightShape::Rect { width, height } = light.shape else {
+        return None;
+    };
+    let radius = (width * height / std::f32::consts::PI).sqrt();
+    (options.as_disk || options.buffer != Buffer::Lists).then_some(AreaLight {
+        shape: LightShape::Disk { radius },
+        ..*light
+    })
+}
+
+/// The same inputs with another light.
+fn lit_by<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    light: AreaLight,
+) -> ShadowInputs<'f> {
+    let params = ViewParams {
+        camera: inputs.camera,
+        light: LightParams::new(&light),
+    };
+    let size = size_of::<ViewParams>() as u64;
+    let buffer = add_uniform(graph, format!("{NAME}.disk {}", inputs.light_name), params);
+    ShadowInputs {
+        light_name: inputs.light_name.clone(),
+        light,
+        camera: inputs.camera,
+        scene_camera: inputs.scene_camera.clone(),
+        gbuffer: inputs.gbuffer,
+        tile_bounds: inputs.tile_bounds,
+        view_params: (buffer, BufferPart { offset: 0, size }),
+        receivers: inputs.receivers.clone(),
+        scene: inputs.scene,
+        ids: inputs.ids,
+    }
+}
+
 fn add_visibility<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
@@ -118,10 +171,16 @@ fn add_visibility<'f>(
     let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
     let (view_params, part) = inputs.view_params;
     let (params, hard, numbers) = (tools.params, tools.hard, tools.silhouettes.list);
-    let lists::Found { pool, lists, tiles } = *found;
+    let lists::Found {
+        pool,
+        lists,
+        tiles,
+        through,
+    } = *found;
     let mut pass = graph.pass(format!("{NAME}.visibility {name}"), PassKind::Compute);
     pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
     pass.read(params, Access::Uniform(Stage::Compute));
+    pass.read(through, Access::Uniform(Stage::Compute));
     let images = [
         gbuffer.view_depth,
         gbuffer.ids,
@@ -163,6 +222,7 @@ fn add_visibility<'f>(
             Bind::storage_image(15, visibility),
             Bind::uniform(16, tiles.arguments),
             Bind::sampled(17, tiles.tiles, nearest),
+            Bind::uniform(18, through),
         ];
         let pipeline = ComputePipelineDesc {
             constants: vec![(0, shape), (1, fours), (2, masked)],

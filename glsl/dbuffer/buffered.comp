@@ -91,7 +91,7 @@ struct Crossing {
     bool between;  // the edge is between the receiver and the light
     float t;       // part of the diameter that is seen past it
     vec2 nearest;  // point of the edge's image on the unit disk nearest to its centre
-    vec2 way;      // unit vector from the centre to it
+    vec2 open;     // unit vector across the edge, towards what is seen
     uint blocker;
 };
 
@@ -137,17 +137,29 @@ Crossing crossing_at_edge(CoverageReceiver r, uvec2 stored, bool umbra) {
     float part = square > 0.0 ? clamp(-dot(from, along) / square, 0.0, 1.0) : 0.0;
     found.nearest = from + part * along;
     float off = length(found.nearest);
-    found.way = off > 0.0 ? found.nearest / off : vec2(-along.y, along.x) * inversesqrt(max(square, 1.0e-30));
+    vec2 way = off > 0.0 ? found.nearest / off : vec2(-along.y, along.x) * inversesqrt(max(square, 1.0e-30));
+    found.open = umbra ? way : -way;
     found.t = umbra ? 0.5 - 0.5 * off : 0.5 + 0.5 * off;
     return found;
 }
 
-// Whether light passes either edge: of one blocker, each on the other's hidden side.
-bool pass_either(Crossing one, Crossing other, bool umbra) {
-    float side = umbra ? 1.0 : -1.0;
-    return one.blocker == other.blocker
-        && side * dot(other.nearest - one.nearest, one.way) < 0.0
-        && side * dot(one.nearest - other.nearest, other.way) < 0.0;
+// Joins what is seen past one more edge, the nearest surface of a blocker first. Light passes either of two
+// edges of one blocker, as at a convex corner or a strip, unless each lies on the other's open side, as at a
+// reflex corner; it passes all blockers.
+float joined(float seen, Crossing one, float past, Crossing other) {
+    float along = dot(one.open, other.open);
+    vec2 apart = other.nearest - one.nearest;
+    bool reflex = dot(apart, one.open) > 0.0 && dot(apart, other.open) < 0.0;
+    return one.blocker == other.blocker && !reflex
+        ? 1.0 - visibility_and(1.0 - seen, 1.0 - past, along)
+        : visibility_and(seen, past, along);
+}
+
+// Whether two edges of a blocker that leaves the light's centre free bound a strip: the other one's umbra
+// crosses the ray.
+bool is_strip(Crossing one, Crossing other) {
+    vec2 apart = other.nearest - one.nearest;
+    return one.blocker == other.blocker && dot(apart, one.open) < 0.0 && dot(apart, other.open) > 0.0;
 }
 
 float pixel_visibility(uvec2 pixel) {
@@ -198,11 +210,11 @@ float pixel_visibility(uvec2 pixel) {
             ? crossing_at_edge(r, stored, umbra)
             : crossing_at_distances(stored, umbra, distance);
         float seen = curve_of(found.t);
-        bool joined = false;
+        bool known = false;
         for (uint i = 0u; i < count; ++i) {
-            joined = joined || kept[i].blocker == found.blocker;
+            known = known || kept[i].blocker == found.blocker;
         }
-        if (!found.between || (push.darkest != 0u && joined)) {
+        if (!found.between || (push.darkest != 0u && known)) {
             continue;
         }
         if (count == 0u) {
@@ -210,14 +222,26 @@ float pixel_visibility(uvec2 pixel) {
         } else if (push.darkest != 0u || push.edges == 0u) {
             result = min(result, seen);
         } else {
-            Crossing last = kept[count - 1u];
-            float along = dot(last.way, found.way);
-            result = pass_either(last, found, umbra)
-                ? 1.0 - visibility_and(1.0 - result, 1.0 - seen, along)
-                : visibility_and(result, seen, along);
+            result = joined(result, kept[count - 1u], seen, found);
         }
         kept[count] = found;
         count += 1u;
+    }
+    // Edges of whose surfaces the ray crosses those of the other kind: the far edge of a strip, and other
+    // blockers that leave the light's centre free.
+    bool others = push.darkest == 0u && push.edges != 0u && push.layers > 1u;
+    for (uint layer = 0u; others && layer < push.layers && count > 0u; ++layer) {
+        uvec2 stored = fetch_surface(layer, !umbra, place);
+        if (stored.x == 0u || stored.x == NO_EDGE) {
+            break;
+        }
+        Crossing found = crossing_at_edge(r, stored, !umbra);
+        float seen = curve_of(found.t);
+        if (found.between && !umbra && is_strip(kept[0], found)) {
+            result = joined(result, kept[0], seen, found);
+        } else if (found.between && umbra && found.blocker != kept[0].blocker) {
+            result = joined(result, kept[0], seen, found);
+        }
     }
     return min(clamp(result, 0.0, 1.0), above);
 }

@@ -19,7 +19,7 @@ layout(constant_id = 0) const uint LIGHT_SHAPE = 1u;
 layout(constant_id = 1) const uint COMBINE = 4u;
 layout(constant_id = 4) const uint FIRST_VIEW = 1u; // pixels that no view sees are settled here
 layout(constant_id = 5) const float DETAIL = 1.0;   // texels of the bits in one of the table
-layout(constant_id = 6) const float ROUND_KERNEL = 0.886227; // half side of the square for a disk
+layout(constant_id = 6) const float ROUND_KERNEL = 1.0; // half side of the square for a disk of radius 1
 
 layout(constant_id = 7) const uint CONTACT = 4u;    // rays of the test within a group; 0: none
 layout(constant_id = 8) const uint FINE = 64u;      // fine slices

@@ -11,6 +11,7 @@ layout(set = 0, binding = 0, std140) uniform Block {
 layout(set = 0, binding = 4) uniform usampler2D seen;    // triangles that the light's centre sees
 layout(set = 0, binding = 5) uniform sampler2D triangles;
 layout(set = 0, binding = 6) uniform sampler2D before;   // stored depth of the surface drawn before
+layout(set = 0, binding = 7) uniform usampler2D before_texels; // and what was stored with it
 
 layout(push_constant) uniform Push {
     uint view;
@@ -19,6 +20,7 @@ layout(push_constant) uniform Push {
     uint arcs;
     uint edges;    // 1: store edges, 0: distances
     uint greatest; // 1: the surface farthest from the light first, 0: the nearest
+    uint darkest;  // 1: one surface of each blocker, as far as the layer before tells
 } push;
 
 layout(location = 0) flat in vec3 first;
@@ -123,7 +125,9 @@ void main() {
     }
     if (push.layer > 0u) {
         float last = texelFetch(before, ivec2(gl_FragCoord.xy), 0).x;
-        if (push.greatest != 0u ? depth <= last : depth >= last) {
+        uint last_blocker = texelFetch(before_texels, ivec2(gl_FragCoord.xy), 0).y & 0xffffu;
+        bool again = push.darkest != 0u && last_blocker == (entry.y & 0xffffu);
+        if (again || (push.greatest != 0u ? depth <= last : depth >= last)) {
             discard;
         }
     }

@@ -51,6 +51,7 @@ struct VolumesPush {
     arcs: u32,
     edges: u32,
     greatest: u32,
+    darkest: u32,
 }
 
 /// Vertices of an edge: `VERTICES` in `dbuffer/volumes.vert`.
@@ -168,7 +169,7 @@ impl Drawn<'_> {
         let side = if views == 0 { 1 } else { options.resolution };
         let image = |format| ImageDesc::new(format, side, side).layers(views.max(1));
         let greatest = options.keep == Keep::Greatest;
-        let mut before: Option<ImageId> = None;
+        let mut before: Option<[ImageId; 2]> = None;
         let mut surfaces = Vec::new();
         for layer in 0..options.layers {
             let texels = image(vk::Format::R32G32_UINT);
@@ -194,10 +195,11 @@ impl Drawn<'_> {
                     arcs: u32::from(!umbra || !greatest),
                     edges: u32::from(options.buffer == Buffer::Edges),
                     greatest: u32::from(greatest),
+                    darkest: u32::from(options.keep == Keep::Darkest),
                 };
                 self.record(pass, inputs, push, before);
             }
-            before = Some(depth);
+            before = Some([depth, texels]);
             surfaces.push(texels);
         }
         surfaces
@@ -208,7 +210,7 @@ impl Drawn<'_> {
         mut pass: crate::graph::PassBuilder<'_, '_>,
         inputs: &ShadowInputs<'_>,
         push: VolumesPush,
-        before: Option<ImageId>,
+        before: Option<[ImageId; 2]>,
     ) {
         let Self {
             params, map, list, ..
@@ -221,8 +223,8 @@ impl Drawn<'_> {
         pass.read(params, Access::Uniform(Stage::Fragment));
         pass.read_part(map, part, Access::Sampled(Stage::Fragment));
         pass.read(ids.triangles, Access::Sampled(Stage::Fragment));
-        if let Some(before) = before {
-            pass.read_part(before, part, Access::Sampled(Stage::Fragment));
+        for image in before.into_iter().flatten() {
+            pass.read_part(image, part, Access::Sampled(Stage::Fragment));
         }
         let shape = shape_number(&inputs.light.shape);
         pass.record(move |ctx| {
@@ -238,9 +240,16 @@ impl Drawn<'_> {
                 },
                 write: true,
             });
-            let before = before.map_or(Bind::sampled(6, ids.triangles, nearest), |before| {
-                Bind::sampled(6, before, nearest).part(part)
-            });
+            let [before, texels] = match before {
+                Some([depth, texels]) => [
+                    Bind::sampled(6, depth, nearest).part(part),
+                    Bind::sampled(7, texels, nearest).part(part),
+                ],
+                None => [
+                    Bind::sampled(6, ids.triangles, nearest),
+                    Bind::sampled(7, map, nearest).part(part),
+                ],
+            };
             let bindings = [
                 Bind::uniform(0, params),
                 Bind::sampled(1, list.list, nearest),
@@ -249,6 +258,7 @@ impl Drawn<'_> {
                 Bind::sampled(4, map, nearest).part(part),
                 Bind::sampled(5, ids.triangles, nearest),
                 before,
+                texels,
             ];
             ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&push))?;
             list.draw(ctx)

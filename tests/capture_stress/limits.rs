@@ -104,6 +104,23 @@ pub fn limits(technique: Technique) -> Limits {
             jump: 0.25,
             flips: MAY_FLIP,
         },
+        // No map but that of the light's centre decides anything, and edges are where triangles have them,
+        // whatever the guise; that map misses what is smaller than a texel where no edge is before the
+        // light. Where a blocker cuts through the light 32 rays decide, and their places on it are
+        // not mirrored with it: 0.033, and 0.0012 of the picture. Where blockers overlap, samples correct
+        // what edges know, so that one more of them may brighten a pixel by more than one sample does:
+        // eight of 3738, by up to 0.049.
+        "dbuffer" => Limits {
+            step: 1.0 / 32.0,
+            fine: 0.001,
+            own_walls: 0.0,
+            turned: 0.04,
+            turned_mean: 0.002,
+            brighter: 0.0025,
+            jumps: 0.001,
+            jump: 0.25,
+            flips: MAY_FLIP,
+        },
         other => panic!("state the limits of technique `{other}` in {}", file!()),
     }
 }

@@ -140,7 +140,7 @@ pub fn leak(technique: Technique) -> f32 {
 /// sixteenth of the sub-texel steps, breaks some: `pcss` in `far-and-near` turned (59 of 3215 pixels),
 /// `occlusion-textures` in `shut-in` scaled (100 of 4096, by up to 0.01), and `oess` in `cage`, where a line lies
 /// within a mesh with dozens of holes and edges beside the line come and go (mean changes of up to 0.06).
-const IN_WORK: [&str; 4] = ["ssoc", "mdi", "dbuffer", "shaft-masks"];
+const IN_WORK: [&str; 3] = ["ssoc", "mdi", "shaft-masks"];
 
 /// All techniques that must hold.
 pub fn finished() -> impl Iterator<Item = Technique> {

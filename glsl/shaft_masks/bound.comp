@@ -214,7 +214,7 @@ void main() {
     uint id = texelFetch(ids, ivec2(within), 0).x;
     MaskReceiver receiver = MaskReceiver(view.camera.eye.xyz + depth * ray, id, true);
     LightFrom light = light_from(view.light, receiver.position);
-    Projection projection = projection_from(receiver);
+    Projection projection = projection_from(receiver, 0.0);
     vec3 normal = fetch_geometric_normal(max(id, 1u) - 1u);
     vec3 above = line_of_plane(light, normal);
     // Nothing is known of a tile whose list is not whole, nor of suns so wide that rows have no widest chord.

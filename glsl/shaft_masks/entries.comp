@@ -154,8 +154,9 @@ bool covers(uvec2 tile, TileBounds bounds, mat3 frame, Triangle t, inout uint lo
 // all rows, seen from every surface.
 bool is_beyond(Shaft shaft, vec3 a, vec3 b) {
     bool beyond = false;
-    // The rows of a sphere's disk turn a little from pixel to pixel.
-    uint last = LIGHT_SHAPE == LIGHT_SPHERE ? 1u : 4u;
+    // The rows of a sphere's disk turn a little from pixel to pixel, and those of a rectangle rise: what is below it
+    // may cross them before their first sample.
+    uint last = LIGHT_SHAPE == LIGHT_SPHERE ? 1u : LIGHT_SHAPE == LIGHT_RECT ? 3u : 4u;
     for (uint i = 0u; i < last; ++i) {
         vec4 plane = shaft.planes[i];
         beyond = beyond || (i != 1u && dot(plane.xyz, a) > plane.w && dot(plane.xyz, b) > plane.w);
@@ -289,7 +290,7 @@ void main() {
         imageStore(lists, at + ivec2(2, 0), uvec4(whole, others, tile.y * tiles.x + tile.x, 0u));
         uint work = (fits ? edges : 0u) + whole + others + (params.counts.z - resume);
         imageStore(estimates, estimate_place(part, ESTIMATE_WORK), uvec4(work));
-        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(dark ? 0u : params.pattern.w));
+        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(dark ? LEVEL_DARK : params.pattern.w));
         if (!dark && (params.pattern.y > 1u || whole + others > TASK_ENTRIES || partly)) {
             uint slot = atomicAdd(pieces.count, 1u);
             atomicMax(pieces.groups_x, min(slot + 1u, TILE_ROW));

@@ -6,8 +6,11 @@ const uint ESTIMATE_TEXELS = 4u;
 // Changes between neighbouring samples, of all pixels, and from CHANGED_PIXEL on the number of pixels that have some.
 const uint ESTIMATE_CHANGES = 0u;
 const uint ESTIMATE_BOUND = 1u; // largest bound of a pixel, the bits of a float; 0 before it is made
-const uint ESTIMATE_LEVEL = 2u; // 0: settled without masks; n: masks of 64 * 4^(n - 1) samples
+const uint ESTIMATE_LEVEL = 2u; // n: masks of 64 * 4^(n - 1) samples; 0: not worked on; else as below
 const uint ESTIMATE_WORK = 3u;  // entries for each block of samples
+
+const uint LEVEL_LIT = 0x100u;
+const uint LEVEL_DARK = 0x101u;
 
 const uint CHANGED_PIXEL = 1u << 20u;
 

@@ -6,6 +6,7 @@
 
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
+#include "shaft_masks/estimates.glsl"
 #include "shaft_masks/lists.glsl"
 #include "shaft_masks/sides.glsl"
 
@@ -34,6 +35,7 @@ layout(set = 0, binding = 9, r32ui) uniform writeonly uimage2D pool;
 layout(set = 0, binding = 10, rgba32ui) uniform writeonly uimage2D lists;
 layout(set = 0, binding = 11, r32f) uniform writeonly image2D visibility;
 layout(set = 0, binding = 12) uniform sampler2D view_depth;
+layout(set = 0, binding = 13, r32ui) uniform writeonly uimage2D estimates;
 
 // A software driver may end loops after 65,535 turns of all lanes of a vector together: a walk ends
 // itself before, and the passes on lists take it up where it ended.
@@ -123,6 +125,7 @@ void main() {
     vec2 depths = fetch_part_depths(part);
     bool lit = !any && resume == nodes && shaft.low.w > 0.0;
     if (lit) {
+        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(LEVEL_LIT));
         for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
             // Stores beyond the picture's border are dropped.
             uvec2 pixel = tile_of_part(part, tiles) * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);

@@ -86,7 +86,7 @@ MaskReceiver fetch_receiver(uvec2 pixel, vec2 depths, out uvec2 blocked) {
     receiver.id = depth > 0.0 ? texelFetch(ids, ivec2(within), 0).x : 0u;
     vec3 normal = fetch_geometric_normal(max(receiver.id, 1u) - 1u);
     normal = dot(normal, ray) > 0.0 ? -normal : normal;
-    blocked = own_mask(light_from(view.light, receiver.position), normal);
+    blocked = own_mask(rows_from(view.light, receiver.position), normal);
     return receiver;
 }
 
@@ -101,7 +101,7 @@ uint store(uint slot, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 bloc
         int hidden = bitCount(blocked.x) + bitCount(blocked.y);
         float samples = float(ROWS * COLUMNS);
         imageStore(visibility, ivec2(pixel), vec4((samples - float(hidden)) / samples));
-        return all(lessThan(pixel, params.counts.xy)) ? changed_pixel(changes_in(blocked)) : 0u;
+        return all(lessThan(pixel, params.counts.xy)) ? changed_pixel(changes_in(blocked, LIGHT_SHAPE == LIGHT_LINE)) : 0u;
     }
     for (uint word = 0u; word < 2u; ++word) {
         ivec2 place = word_place(slot, pixel % TILE_SIZE, params.pattern.y, 2u * block + word);
@@ -148,10 +148,10 @@ void main() {
         || stored.z < params.counts.z;
 
     if (WALK == 0u) {
-        Projection from_0 = projection_from(receiver_0);
-        Projection from_1 = projection_from(receiver_1);
-        Projection from_2 = projection_from(receiver_2);
-        Projection from_3 = projection_from(receiver_3);
+        Projection from_0 = projection_from(receiver_0, row_rise());
+        Projection from_1 = projection_from(receiver_1, row_rise());
+        Projection from_2 = projection_from(receiver_2, row_rise());
+        Projection from_3 = projection_from(receiver_3, row_rise());
         uint counts_0[2u * ROWS];
         uint counts_1[2u * ROWS];
         uint counts_2[2u * ROWS];
@@ -191,10 +191,10 @@ void main() {
             add_whole(from_3, a, b, c, blocked_3);
         }
         end = min(first + TASK_ENTRIES, entries.whole + entries.others);
-        LightFrom light_0 = light_from(view.light, receiver_0.position);
-        LightFrom light_1 = light_from(view.light, receiver_1.position);
-        LightFrom light_2 = light_from(view.light, receiver_2.position);
-        LightFrom light_3 = light_from(view.light, receiver_3.position);
+        LightFrom light_0 = rows_from(view.light, receiver_0.position);
+        LightFrom light_1 = rows_from(view.light, receiver_1.position);
+        LightFrom light_2 = rows_from(view.light, receiver_2.position);
+        LightFrom light_3 = rows_from(view.light, receiver_3.position);
         for (uint i = max(first, entries.whole); i < end; ++i) {
             uint place = entries.first + entries.room - 1u - (i - entries.whole);
             Blocker blocker = fetch_blocker(texelFetch(triangle_pool, triangle_texel_place(place), 0).x);
@@ -204,10 +204,10 @@ void main() {
             add_blocker(receiver_3, light_3, block, blocker, blocked_3);
         }
     } else {
-        LightFrom light_0 = light_from(view.light, receiver_0.position);
-        LightFrom light_1 = light_from(view.light, receiver_1.position);
-        LightFrom light_2 = light_from(view.light, receiver_2.position);
-        LightFrom light_3 = light_from(view.light, receiver_3.position);
+        LightFrom light_0 = rows_from(view.light, receiver_0.position);
+        LightFrom light_1 = rows_from(view.light, receiver_1.position);
+        LightFrom light_2 = rows_from(view.light, receiver_2.position);
+        LightFrom light_3 = rows_from(view.light, receiver_3.position);
         // A walk can begin at any node: what is known of those above is only that they may be met.
         uint first = (push.first_run + gl_WorkGroupID.z / params.pattern.y) * push.run;
         uint node = max(first, stored.z);

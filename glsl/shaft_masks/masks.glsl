@@ -31,7 +31,12 @@ LightFrom light_from(Light light, vec3 p) {
     } else if (LIGHT_SHAPE == LIGHT_LINE) {
         return LightFrom(center, light.axis_x.xyz * light.axis_x.w, vec3(0.0));
     } else if (LIGHT_SHAPE != LIGHT_SPHERE) {
-        return LightFrom(center, light.axis_x.xyz * light.axis_x.w, light.axis_y.xyz * light.axis_y.w);
+        vec3 axis_x = light.axis_x.xyz * light.axis_x.w;
+        vec3 axis_y = light.axis_y.xyz * light.axis_y.w;
+        if (LIGHT_SHAPE != LIGHT_RECT) {
+            turn_axes(axis_x, axis_y);
+        }
+        return LightFrom(center, axis_x, axis_y);
     }
     // The disk bounded by the sphere's outline.
     float square = max(dot(center, center), 1.0e-37);
@@ -39,8 +44,21 @@ LightFrom light_from(Light light, vec3 p) {
     vec3 along = center * inversesqrt(square);
     vec3 near = abs(dot(along, light.axis_x.xyz)) < 0.9 ? light.axis_x.xyz : light.axis_y.xyz;
     vec3 x = normalize(near - along * dot(near, along));
+    vec3 y = cross(along, x);
+    turn_axes(x, y);
     float outline = light.axis_x.w * sqrt(rest);
-    return LightFrom(center * rest, outline * x, outline * cross(along, x));
+    return LightFrom(center * rest, outline * x, outline * y);
+}
+
+// How far along the second axis rows rise for one unit along the first.
+float row_rise() {
+    return LIGHT_SHAPE == LIGHT_RECT ? 1.0 / float(ROWS * params.pattern.x) : 0.0;
+}
+
+// The light in coordinates in which rows are level.
+LightFrom rows_from(Light light, vec3 p) {
+    LightFrom straight = light_from(light, p);
+    return LightFrom(straight.center, straight.x + row_rise() * straight.y, straight.y);
 }
 
 struct MaskReceiver {
@@ -83,14 +101,15 @@ struct Projection {
     bool turned; // for the receiver y is clockwise of x
 };
 
-Projection projection_from(MaskReceiver receiver) {
+// rise: row_rise() for coordinates in which rows are level, 0 for those of the light.
+Projection projection_from(MaskReceiver receiver, float rise) {
     LightFrom light = light_from(view.light, receiver.position);
     vec3 across = cross(light.x, light.y);
     float height = dot(across, light.center);
     Projection projection;
     projection.from = receiver.position;
     projection.x = light.x / max(dot(light.x, light.x), 1.0e-37);
-    projection.y = light.y / max(dot(light.y, light.y), 1.0e-37);
+    projection.y = light.y / max(dot(light.y, light.y), 1.0e-37) - rise * projection.x;
     projection.z = across / (abs(height) < 1.0e-37 ? 1.0e-37 : height);
     projection.middle = vec2(dot(projection.x, light.center), dot(projection.y, light.center));
     projection.turned = height > 0.0;

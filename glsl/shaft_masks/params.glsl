@@ -4,7 +4,11 @@
 
 layout(constant_id = 0) const uint LIGHT_SHAPE = 0u;
 
-// Samples of the light lie in rows along its first axis.
+// Samples of the light lie in rows along its first axis: of a round light turned by an eighth of a circle and a half,
+// of a rectangle along lines that rise by nearly one row from end to end. Edges of things built along the
+// light's own axes then cross rows and columns one by one, not all of one at once.
+const float ROW_COSINE = 0.92387953251;
+const float ROW_SINE = 0.38268343236;
 const uint MOST_ROWS = 32u;
 
 struct ShaftParams {

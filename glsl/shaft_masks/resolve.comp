@@ -57,7 +57,7 @@ void main() {
         uvec2 mask = uvec2(texelFetch(words, word_place(slot, gl_LocalInvocationID.xy, blocks, 2u * block), 0).x,
             texelFetch(words, word_place(slot, gl_LocalInvocationID.xy, blocks, 2u * block + 1u), 0).x);
         hidden += bitCount(mask.x) + bitCount(mask.y);
-        changes += changes_in(mask);
+        changes += changes_in(mask, params.rows[0].x == params.rows[1].x);
     }
     if (changes > 0u && all(lessThan(pixel, params.counts.xy))) {
         imageAtomicAdd(estimates, estimate_place(part, ESTIMATE_CHANGES), changed_pixel(changes));

@@ -43,7 +43,8 @@ layout(set = 0, binding = 9, std430) buffer Spent {
 } spent;
 
 layout(push_constant) uniform Push {
-    float target_square; // squared error to be reached; below 0 where a bound on each pixel is asked for
+    // Squared error to be reached: 0 works on all tiles. Below 0 where a bound on each pixel is asked for.
+    float target_square;
     float bound;
     float scale;         // squared error of a pixel for one change among 64 samples
     uint work;           // most that all rounds may do
@@ -81,7 +82,7 @@ Tile fetch_tile(uvec2 part) {
     uint level = imageLoad(estimates, estimate_place(part, ESTIMATE_LEVEL)).x;
     Tile tile;
     tile.pixels = changes / CHANGED_PIXEL;
-    float samples = exp2(4.0 * float(max(level, 1u) - 1u));
+    float samples = exp2(4.0 * float(clamp(level, 1u, params.pattern.w) - 1u));
     tile.square = push.scale * float(changes % CHANGED_PIXEL) / samples;
     tile.work = imageLoad(estimates, estimate_place(part, ESTIMATE_WORK)).x;
     tile.work = min(tile.work, 0xffffffffu / params.pattern.y) * params.pattern.y;
@@ -90,7 +91,8 @@ Tile fetch_tile(uvec2 part) {
         float bound = uintBitsToFloat(imageLoad(estimates, estimate_place(part, ESTIMATE_BOUND)).x);
         key = bound > push.bound ? bound * bound : 0.0;
     }
-    bool open = level + 1u == params.pattern.w && key > 0.0;
+    // Samples may all agree and still pass by an edge.
+    bool open = level + 1u == params.pattern.w && (key > 0.0 || push.target_square == 0.0);
     // Half an octave a class, from 1 down.
     int from_one = (int(floatBitsToUint(1.0) >> 22) - int(floatBitsToUint(min(key, 1.0)) >> 22));
     tile.index = open ? uint(clamp(from_one, 0, int(CLASSES) - 1)) : CLASSES;
@@ -143,7 +145,7 @@ void choose() {
     uint last = CLASSES;
     uint wanted = 0u;
     for (uint i = 0u; i < CLASSES; ++i) {
-        if (class_counts[i] > 0u && (push.target_square < 0.0 || square > most)) {
+        if (class_counts[i] > 0u && (push.target_square <= 0.0 || square > most)) {
             // Four times the samples are left with a quarter of a crowd's squared error, and less of an edge's.
             square -= 0.75 * class_squares[i];
             wanted += class_counts[i];

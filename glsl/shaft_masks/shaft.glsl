@@ -99,6 +99,13 @@ bool shaft_meets_triangle(Shaft shaft, vec3 a, vec3 b, vec3 c) {
     return meets;
 }
 
+// The axes of a round light that its rows of samples lie along.
+void turn_axes(inout vec3 x, inout vec3 y) {
+    vec3 old = x;
+    x = ROW_COSINE * old + ROW_SINE * y;
+    y = ROW_COSINE * y - ROW_SINE * old;
+}
+
 // Axes in which the light is held by a box: x and y along its own where it is flat, z towards the
 // surfaces, of a sun towards it. p: a surface.
 mat3 light_frame(Light light, vec3 p) {
@@ -111,7 +118,12 @@ mat3 light_frame(Light light, vec3 p) {
         vec3 x = normalize(near - z * dot(near, z));
         return mat3(x, cross(z, x), z);
     }
-    return mat3(light.axis_x.xyz, light.axis_y.xyz, z);
+    vec3 x = light.axis_x.xyz;
+    vec3 y = light.axis_y.xyz;
+    if (LIGHT_SHAPE == LIGHT_DISK || LIGHT_SHAPE == LIGHT_SUN) {
+        turn_axes(x, y);
+    }
+    return mat3(x, y, z);
 }
 
 // Half the size of the light along the axes of its frame, metres; of a sun at distance 1.

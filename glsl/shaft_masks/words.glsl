@@ -16,11 +16,13 @@ ivec2 word_place(uint slot, uvec2 within, uint blocks, uint word) {
 }
 
 // Pairs of neighbouring samples, in a row or a column of a block, of which one is hidden and one is not.
-uint changes_in(uvec2 mask) {
+// in_line: rows lie one after the other, and not beside each other.
+uint changes_in(uvec2 mask, bool in_line) {
     uvec2 rows = (mask ^ mask >> 1) & 0x7f7f7f7fu;
     uvec2 columns = (mask ^ mask >> 8) & 0x00ffffffu;
     uint between = (mask.x >> 24 ^ mask.y) & 0xffu;
-    return uint(bitCount(rows.x) + bitCount(rows.y) + bitCount(columns.x) + bitCount(columns.y) + bitCount(between));
+    int beside = bitCount(columns.x) + bitCount(columns.y) + bitCount(between);
+    return uint(bitCount(rows.x) + bitCount(rows.y) + (in_line ? 0 : beside));
 }
 
 #endif

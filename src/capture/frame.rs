@@ -58,6 +58,8 @@ pub struct CapturedLight {
     pub visibility: Vec<f32>,
     /// Passes that made it.
     pub passes: Vec<String>,
+    /// What the technique counts of its work, by name; of frames with images brought back by name.
+    pub counters: BTreeMap<String, u64>,
 }
 
 /// Why a frame could not be had.

@@ -10,10 +10,14 @@ use crate::graph::{
 };
 use crate::renderer::{Frame, SceneBuffers};
 use crate::scene::Scene;
+use crate::shadow::Tally;
 use ash::vk;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::time::Instant;
+
+/// Asks for counters, among names of images.
+const COUNTERS: &str = "counters";
 
 /// Name of the passes that copy images to the host: no part of the frame.
 const READ_BACK: &str = "read back";
@@ -89,7 +93,8 @@ impl<'s> FrameRenderer<'s> {
     /// along the view direction, 0 where nothing was hit), `normal` and `shading_normal` (world
     /// axes), `visibility` (of the first light), `visibility_bound` (the most that it is off, where the
     /// technique proves that), or any image that the frame writes, under its name
-    /// in the [`Plan`]; `NAME[LAYER]` and `NAME[LAYER,LEVEL]` are parts of it.
+    /// in the [`Plan`]; `NAME[LAYER]` and `NAME[LAYER,LEVEL]` are parts of it. `counters` is no image:
+    /// with it the lights' counters are filled in.
     ///
     /// # Errors
     /// As for [`render`](Self::render), and [`CaptureError::NoSuchImage`],
@@ -244,6 +249,8 @@ fn run(
 struct ReadBacks {
     sources: Vec<(Source, u64)>,
     dumps: Vec<Dump>,
+    /// Of each light, and the place of its image among the sources.
+    tallies: Vec<Option<(Tally, usize)>>,
     /// Number of sources before those of the dumps.
     fixed: usize,
     /// Size of the buffer.
@@ -257,8 +264,10 @@ impl ReadBacks {
         request: &FrameRequest,
         names: &[&str],
     ) -> Result<Self, CaptureError> {
+        let is_counted = names.contains(&COUNTERS);
+        let images = names.iter().filter(|name| **name != COUNTERS);
         let find = |name: &&str| Dump::find(graph, frame, name);
-        let dumps: Vec<Dump> = names.iter().map(find).collect::<Result<_, _>>()?;
+        let dumps: Vec<Dump> = images.map(find).collect::<Result<_, _>>()?;
         let [width, height] = request.size;
         let picture = |image, texel_bytes| Source {
             image,
@@ -271,6 +280,19 @@ impl ReadBacks {
         };
         let mut sources = vec![picture(frame.radiance, 16)];
         sources.extend(frame.visibility.iter().map(|image| picture(*image, 4)));
+        let mut tallies = Vec::new();
+        for mask in &frame.masks {
+            let tally = mask.tally.filter(|_| is_counted);
+            let desc = tally.and_then(|tally| graph.image_desc(tally.image));
+            tallies.push(tally.zip(desc).map(|(tally, desc)| {
+                sources.push(Source {
+                    width: desc.width,
+                    height: desc.height,
+                    ..picture(tally.image, 4)
+                });
+                (tally, sources.len() - 1)
+            }));
+        }
         let fixed = sources.len();
         sources.extend(dumps.iter().flat_map(|dump| dump.sources.iter().copied()));
         let mut bytes = 0u64;
@@ -283,6 +305,7 @@ impl ReadBacks {
         Ok(Self {
             sources: sources.into_iter().map(place).collect(),
             dumps,
+            tallies,
             fixed,
             bytes,
         })
@@ -339,7 +362,11 @@ impl ReadBacks {
         let lights = ranges.enumerate().map(|(at, (light, range))| {
             let passes = plan.passes.iter();
             let own = passes.filter(|pass| range.contains(&pass.declared));
+            let tally = self.tallies.get(at).copied().flatten();
+            let counts = tally.map(|(tally, at)| (tally.count)(&self.take::<u32>(at, bytes)));
+            let counts = counts.into_iter().flatten();
             CapturedLight {
+                counters: counts.map(|(name, n)| (name.to_string(), n)).collect(),
                 light: *light,
                 visibility: self.take(1 + at, bytes),
                 passes: own.map(|pass| pass.name.to_string()).collect(),

@@ -44,6 +44,28 @@ pub(super) struct ImageEntry {
     pub(super) setup_ms: SetupTimes,
     pub(super) peak_bytes: PeakBytes,
     pub(super) counters: BTreeMap<String, u64>,
+    /// With `--visibility-bound`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) bound: Option<BoundEntry>,
+}
+
+/// The proven bound on the error of the visibility, over all pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(super) struct BoundEntry {
+    pub(super) max: f32,
+    /// What 99 of 100 pixels are not above.
+    pub(super) p99: f32,
+}
+
+impl BoundEntry {
+    /// `None` of no pixels.
+    pub(super) fn of(bounds: &[f32]) -> Option<Self> {
+        let mut sorted = bounds.to_vec();
+        sorted.sort_by(f32::total_cmp);
+        let p99 = *sorted.get((sorted.len() * 99).div_ceil(100).saturating_sub(1))?;
+        let max = *sorted.last()?;
+        Some(Self { max, p99 })
+    }
 }
 
 /// Median and extremes of repeated measurements.

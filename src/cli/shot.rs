@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::error::CliError;
 use super::outputs::{Format, ImageFile};
-use super::report::{ImageEntry, Measurements, PeakBytes, SetupTimes};
+use super::report::{BoundEntry, ImageEntry, Measurements, PeakBytes, SetupTimes};
 use super::summary::single_value;
 use super::template::ImageTemplate;
 use crate::capture::output::{Output, OutputError};
@@ -89,6 +89,8 @@ pub(super) struct Shot {
     /// What was looked at, for people.
     pub(super) camera: String,
     peak: PeakBytes,
+    /// Of each light.
+    light_counters: Vec<BTreeMap<String, u64>>,
 }
 
 impl Shot {
@@ -97,7 +99,13 @@ impl Shot {
         request: &FrameRequest,
         renderer: &mut FrameRenderer<'_>,
     ) -> Result<Self, CliError> {
-        let mut captured = renderer.render_with_images(request, &plan.dumps)?;
+        let mut names = plan.dumps;
+        if plan.repeats.is_some() {
+            names.push("counters");
+        }
+        let mut captured = renderer.render_with_images(request, &names)?;
+        let counters = captured.lights.iter().map(|light| light.counters.clone());
+        let light_counters = counters.collect();
         let first_frame = captured.frame_ms;
         let mut measured = Measurements::default();
         let mut measured_static = Measurements::default();
@@ -142,6 +150,7 @@ impl Shot {
                 host: memory.peak_host_bytes,
             },
             captured,
+            light_counters,
         })
     }
 
@@ -161,7 +170,8 @@ impl Shot {
     ) -> impl Iterator<Item = ImageEntry> + 's {
         let (frame, measured) = (&self.captured, &self.measured);
         let lights = frame.lights.iter().zip(&self.lights);
-        lights.map(move |(light, scene_light)| ImageEntry {
+        let lights = lights.zip(&self.light_counters).enumerate();
+        lights.map(move |(at, ((light, scene_light), counters))| ImageEntry {
             scene: scene.display().to_string(),
             frame: u64::from(self.number),
             light: scene_light.name.clone(),
@@ -176,8 +186,25 @@ impl Shot {
             passes: measured.passes(frame),
             setup_ms: self.setup,
             peak_bytes: self.peak,
-            counters: frame.counters.clone(),
+            counters: frame
+                .counters
+                .iter()
+                .chain(counters)
+                .map(|(k, n)| (k.clone(), *n))
+                .collect(),
+            // It is the first light's.
+            bound: self.bound().filter(|_| at == 0),
         })
+    }
+
+    /// Of the image of bounds, if there is one.
+    fn bound(&self) -> Option<BoundEntry> {
+        let mut images = self.captured.images.iter();
+        let image = images.find(|image| image.name == "visibility_bound")?;
+        match image.planes.first()? {
+            Samples::Float(values) => BoundEntry::of(values),
+            Samples::Uint(_) => None,
+        }
     }
 
     /// The bytes of a file.

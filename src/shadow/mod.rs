@@ -63,6 +63,17 @@ pub struct ShadowMask {
     pub end_influences: Option<ImageId>,
     /// R32F: a bound on the error of `visibility`; `None` where the technique proves none.
     pub error_bound: Option<ImageId>,
+    /// What can be counted of the work, if anything.
+    pub tally: Option<Tally>,
+}
+
+/// Counts that are made on the host from an image.
+#[derive(Clone, Copy, Debug)]
+pub struct Tally {
+    /// R32_UINT.
+    pub image: ImageId,
+    /// Counts by name, from all its texels.
+    pub count: fn(&[u32]) -> Vec<(&'static str, u64)>,
 }
 
 impl ShadowMask {
@@ -72,6 +83,7 @@ impl ShadowMask {
             visibility,
             end_influences: None,
             error_bound: None,
+            tally: None,
         }
     }
 }

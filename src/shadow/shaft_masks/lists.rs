@@ -39,8 +39,8 @@ impl Making {
         parts: TileList,
         visibility: ImageId,
     ) -> (Lists, Made) {
-        let (candidates, visibility) = self.add_candidates(graph, inputs, parts, visibility);
-        self.add_entries(graph, inputs, candidates, visibility)
+        let (candidates, made) = self.add_candidates(graph, inputs, parts, visibility);
+        self.add_entries(graph, inputs, candidates, made)
     }
 
     fn add_candidates(
@@ -49,7 +49,7 @@ impl Making {
         inputs: &ShadowInputs<'_>,
         parts: TileList,
         visibility: ImageId,
-    ) -> (Candidates, ImageId) {
+    ) -> (Candidates, Made) {
         let name = &inputs.light_name;
         let size = inputs.camera.size();
         let [across, down] = tile_counts(size);
@@ -105,6 +105,7 @@ impl Making {
         let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
         let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
         let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
+        let estimates = pass.write(self.estimates, Access::StorageWrite(Stage::Compute));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -121,6 +122,7 @@ impl Making {
                 Bind::storage_image(10, lists),
                 Bind::storage_image(11, visibility),
                 Bind::sampled(12, view_depth, nearest),
+                Bind::storage_image(13, estimates),
             ];
             let shader = &spirv::SHAFT_MASKS_LISTS_COMP;
             let pipeline = ComputePipelineDesc {
@@ -140,7 +142,11 @@ impl Making {
             partial,
             pieces,
         };
-        (candidates, visibility)
+        let made = Made {
+            visibility,
+            estimates,
+        };
+        (candidates, made)
     }
 
     fn add_entries(
@@ -148,7 +154,7 @@ impl Making {
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
         candidates: Candidates,
-        visibility: ImageId,
+        made: Made,
     ) -> (Lists, Made) {
         let name = &inputs.light_name;
         let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
@@ -195,8 +201,8 @@ impl Making {
         let edges = pass.overwrite(edges, Access::StorageWrite(Stage::Compute));
         let triangles = pass.overwrite(triangles, Access::StorageWrite(Stage::Compute));
         let tasks = pass.overwrite(tasks, Access::StorageWrite(Stage::Compute));
-        let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
-        let estimates = pass.write(self.estimates, Access::StorageWrite(Stage::Compute));
+        let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
+        let estimates = pass.write(made.estimates, Access::StorageWrite(Stage::Compute));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [

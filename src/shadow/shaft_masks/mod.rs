@@ -189,6 +189,7 @@ pub(super) fn add_passes<'f>(
     let (made, bound) = refine::Refining::new(masks, options, spent).add(graph, inputs, made);
     ShadowMask {
         error_bound: Some(bound),
+        tally: Some(refine::tally(made.estimates)),
         ..ShadowMask::new(made.visibility)
     }
 }

@@ -15,7 +15,7 @@ use crate::gpu::{ComputePipelineDesc, spirv};
 use crate::graph::{
     Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
 };
-use crate::shadow::ShadowInputs;
+use crate::shadow::{ShadowInputs, Tally};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
@@ -71,6 +71,44 @@ pub(super) fn no_estimates(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> 
     estimates
 }
 
+/// What the estimates say when all is done: `tiles_lit`, `tiles_umbra`, `tiles_penumbra`, which are the
+/// tiles, or parts of one, that some of the light is above; of the last `tiles_256` and `tiles_1024`, which have
+/// so many samples, `tile_entries`, the edges and triangles on their lists, and
+/// `estimated_error_millionths`, of their partly lit pixels.
+pub(super) fn tally(estimates: ImageId) -> Tally {
+    let image = estimates;
+    Tally { image, count }
+}
+
+/// `LEVEL_LIT` and `LEVEL_DARK` in `shaft_masks/estimates.glsl`.
+const LEVEL_LIT: u32 = 0x100;
+const LEVEL_DARK: u32 = 0x101;
+
+fn count(texels: &[u32]) -> Vec<(&'static str, u64)> {
+    let tiles = || texels.chunks_exact(ESTIMATE_TEXELS as usize);
+    let of = |level: u32| tiles().filter(|tile| tile[2] == level).count() as u64;
+    let [few, more, most] = [1, 2, 3].map(of);
+    let penumbra = || tiles().filter(|tile| (1..=3).contains(&tile[2]));
+    let squares = penumbra().map(|tile| {
+        let samples = f64::from(BLOCK * BLOCK) * 4.0_f64.powi(tile[2] as i32 - 1);
+        f64::from(CHANGE_SQUARE) * f64::from(tile[0] & 0xf_ffff) / (samples * samples)
+    });
+    let pixels: u32 = penumbra().map(|tile| tile[0] >> 20).sum();
+    let error = (squares.sum::<f64>() / f64::from(pixels.max(1))).sqrt();
+    vec![
+        ("tiles_lit", of(LEVEL_LIT)),
+        ("tiles_umbra", of(LEVEL_DARK)),
+        ("tiles_penumbra", few + more + most),
+        ("tiles_256", more),
+        ("tiles_1024", most),
+        (
+            "tile_entries",
+            penumbra().map(|tile| u64::from(tile[3])).sum(),
+        ),
+        ("estimated_error_millionths", (1.0e6 * error).round() as u64),
+    ]
+}
+
 /// The rounds after the first masks.
 pub(super) struct Refining {
     first: Masks,
@@ -107,8 +145,7 @@ impl Refining {
         ];
         let goals: Vec<Goal> = goals.into_iter().flatten().collect();
         if goals.is_empty() || options.side == MOST_SIDE {
-            let estimates = made.estimates;
-            (bound, _) = first.add_bound(graph, inputs, bound, estimates);
+            (bound, made.estimates) = first.add_bound(graph, inputs, bound, made.estimates);
             return (made, bound);
         }
         // Bounds are made as soon as tiles are chosen by them, else at the end.
@@ -170,11 +207,10 @@ impl Refining {
             }
         }
         if !by_bound {
-            let mut estimates = made.estimates;
             for masks in &mut all {
                 // What changed in them since is not looked at.
                 masks.lists.lists = lists.lists;
-                (bound, estimates) = masks.add_bound(graph, inputs, bound, estimates);
+                (bound, made.estimates) = masks.add_bound(graph, inputs, bound, made.estimates);
             }
         }
         (made, bound)

@@ -1,4 +1,9 @@
 //! Where the samples of `shaft-masks` lie on a light: in rows, equal areas to equal areas.
+//!
+//! Things are often built along the same axes as the light above them. An edge along a row would hide or
+//! show all of it at once, so rows of round lights are turned against the light's axes and those of
+//! rectangles rise, and from row to row samples stand elsewhere in their cells. Each is still in a cell
+//! of its own.
 
 use crate::light::LightShape;
 use glam::DVec2;
@@ -49,6 +54,17 @@ impl Row {
     }
 }
 
+/// Turns places in a round light's rows to its own axes: `ROW_COSINE` and `ROW_SINE` in
+/// `shaft_masks/params.glsl`, of pi / 8.
+const TURN: DVec2 = DVec2::new(0.923_879_532_51, 0.382_683_432_36);
+
+/// Columns that the samples of a row stand off the middles of their cells, -0.5 to 0.5: bits
+/// reversed, so that neighbours differ much and a row and the one that mirrors it are opposite.
+fn shift(row: u32, side: u32) -> f64 {
+    let reversed = row.reverse_bits() >> (32 - side.ilog2());
+    (f64::from(reversed) + 0.5) / f64::from(side) - 0.5
+}
+
 /// Tangent of half a sun's angle, 0 for other lights.
 fn tangent(shape: &LightShape) -> f64 {
     match shape {
@@ -70,7 +86,7 @@ pub(super) fn rows(shape: &LightShape, side: u32) -> Vec<Row> {
     };
     match shape {
         LightShape::Point | LightShape::Rect { .. } => (0..side)
-            .map(|r| row(even(r), 0.5 * count, 0.5 * count))
+            .map(|r| row(even(r), 0.5 * count, 0.5 * count - shift(r, side)))
             .collect(),
         // One row after the other.
         LightShape::Line { .. } => {
@@ -130,7 +146,7 @@ fn strips(side: u32, tangent: f64) -> Vec<Row> {
         Row {
             y,
             scale: 0.5 * count * (w + (tangent * half).powi(2)).sqrt() / half,
-            middle: 0.5 * count,
+            middle: 0.5 * count - shift(r, side),
             w,
             strip: [place(from), place(to)],
         }
@@ -146,6 +162,13 @@ pub fn light_samples(shape: &LightShape, side: u32) -> Vec<DVec2> {
     let tangent = tangent(shape);
     let on_light = |x: f64, y: f64| {
         let at = DVec2::new(x, y);
+        let at = match shape {
+            LightShape::Disk { .. } | LightShape::Sphere { .. } | LightShape::Sun { .. } => {
+                TURN.rotate(at)
+            }
+            LightShape::Rect { .. } => DVec2::new(x, y + x / f64::from(side)),
+            LightShape::Point | LightShape::Line { .. } => at,
+        };
         if tangent == 0.0 || at == DVec2::ZERO {
             return at;
         }
@@ -193,7 +216,14 @@ mod tests {
             },
             8,
         );
-        assert_eq!(square[0], DVec2::splat(-0.875));
+        // Each in its cell, at places of its own along the first axis.
+        let cells = square.iter().map(|p| (4.0 * (*p + 1.0)).floor());
+        let wanted = (0..64).map(|i| DVec2::new(f64::from(i % 8), f64::from(i / 8)));
+        assert!(cells.eq(wanted), "{square:?}");
+        let mut places: Vec<f64> = square.iter().map(|p| p.x).collect();
+        places.sort_by(f64::total_cmp);
+        let even = |(i, x): (usize, &f64)| (x - ((i as f64 + 0.5) / 32.0 - 1.0)).abs() < 1.0e-12;
+        assert!(places.iter().enumerate().all(even), "{places:?}");
         let line = light_samples(&LightShape::Line { length: 1.0 }, 8);
         let evenly =
             |(i, p): (usize, &DVec2)| (p.x - ((i as f64 + 0.5) / 32.0 - 1.0)).abs() < 1.0e-12;

@@ -7,7 +7,7 @@ use antumbra::capture::{FrameRenderer, FrameRequest, Samples};
 use antumbra::scene::{LoadOptions, Scene};
 use std::path::Path;
 
-const SIZE: usize = 64;
+const SIZE: usize = 32;
 const TILE: usize = 8;
 
 /// Visibility of the first light of a scene.
@@ -77,83 +77,60 @@ fn rms(image: &[f32], truth: &[f32]) -> f64 {
     f64::sqrt(sum / count)
 }
 
+/// One scene and few pictures: with 1024 samples they take seconds on drivers that keep no arrays in
+/// registers.
 #[test]
 fn tiles_get_more_samples_where_they_need_them() {
     let _one = support::serial();
-    let mut views = Views::of("fences.gltf");
-    let few = views.see("target-error=none");
+    let mut views = Views::of("lights.gltf");
+    let with_bound = |views: &mut Views, options: &str| {
+        let (image, bounds) = views.see_with(options, &["visibility_bound"]);
+        (image, bounds.into_iter().next().unwrap())
+    };
+    let (few, coarse) = with_bound(&mut views, "target-error=none");
     let more = views.see("target-error=none,samples=256");
-    let most = views.see("target-error=none,samples=1024");
-    assert_same(&views.see("target-error=0"), &most, "all tiles");
-    assert_same(&views.see("target-error=1"), &few, "none");
-
+    let (most, fine) = with_bound(&mut views, "target-error=none,samples=1024");
     let pictures = [&few[..], &more, &most];
     let all = rms(&few, &most);
-    for target in [0.016, 0.008] {
-        let image = views.see(&format!("target-error={target}"));
-        let sources = sources(&image, &pictures);
-        let count = |source| sources.iter().filter(|s| **s == Some(source)).count();
-        let counts = [count(0), count(1), count(2)];
-        let reached = rms(&image, &most);
-        println!("{target}: {reached:.4} of {all:.4}, tiles {counts:?} by samples");
-        assert!(
-            sources.iter().all(Option::is_some),
-            "each tile is one of the three"
-        );
-        assert!(reached < all && reached < 1.5 * target, "{reached}");
-        assert!(count(1) > 0 && counts[0] + counts[1] > 0, "{counts:?}");
-    }
-    views.end();
-}
 
-#[test]
-fn budgets_and_bounds_hold() {
-    let _one = support::serial();
-    let mut views = Views::of("lights.gltf");
-    let few = views.see("target-error=none");
-    let most = views.see("target-error=none,samples=1024");
+    assert_same(&views.see("target-error=1"), &few, "it is less already");
+    let target = 0.01;
+    let image = views.see(&format!("target-error={target}"));
+    let from = sources(&image, &pictures);
+    let counts = [0, 1, 2].map(|source| from.iter().filter(|s| **s == Some(source)).count());
+    let reached = rms(&image, &most);
+    println!("target {target}: {reached:.4} of {all:.4}, tiles {counts:?} by samples");
+    assert!(from.iter().all(Option::is_some), "each is one of the three");
+    assert!(reached < all && reached < 1.5 * target, "{reached}");
+    assert!(counts[0] > 0 && counts[1] > 0, "{counts:?}");
+
     let none = views.see("target-error=0,budget-work=0");
     assert_same(&none, &few, "nothing may be done");
-    let [little, more] = ["1000", "20000"].map(|work| {
-        let options = format!("target-error=0,budget-work={work}");
-        let image = views.see(&options);
-        assert_same(&views.see(&options), &image, "the same again");
-        image
-    });
-    let off = [&few, &little, &more, &most].map(|image| rms(image, &most));
-    println!("errors with more and more work: {off:?}");
-    assert!(off.is_sorted_by(|a, b| a > b), "{off:?}");
+    let options = "target-error=0,budget-work=8000";
+    let some = views.see(options);
+    assert_same(&views.see(options), &some, "the same again");
+    let reached = rms(&some, &most);
+    println!("with some work: {reached:.4} of {all:.4}");
+    assert!(reached > 0.0 && reached < all, "{reached}");
 
-    assert_same(&views.see("target-error=0,budget-ms=0"), &few, "no time");
+    let image = views.see("target-error=0,budget-ms=0");
+    assert_same(&image, &few, "no time");
     let image = views.see("target-error=0,budget-ms=1000000");
-    assert_same(&image, &most, "all the time");
+    assert_same(&image, &most, "all the time, and all tiles");
 
-    let bound_of = |views: &mut Views, options: &str| {
-        let (_, images) = views.see_with(options, &["visibility_bound"]);
-        images.into_iter().next().unwrap()
-    };
-    let coarse = bound_of(&mut views, "target-error=none");
-    let fine = bound_of(&mut views, "target-error=none,samples=1024");
-    let within = bound_of(&mut views, "target-error=none,bound=0.15");
-    let over = |bounds: &[f32]| bounds.iter().filter(|b| **b > 0.15).count();
-    println!(
-        "above the bound: {} first, {} at most samples, {} then",
-        over(&coarse),
-        over(&fine),
-        over(&within)
-    );
-    assert!(over(&coarse) > 20, "there is something to do");
+    let most_bound = 0.2;
+    let options = format!("target-error=none,bound={most_bound}");
+    let (_, within) = with_bound(&mut views, &options);
+    let over = |bounds: &[f32]| bounds.iter().filter(|b| **b > most_bound).count();
+    let counts = [&coarse, &fine, &within].map(|bounds| over(bounds));
+    println!("above the bound: {counts:?} with 64, 1024 and as many samples as are needed");
+    assert!(counts[0] > counts[1], "there is something to do");
     // A pixel is above it only where 1024 samples are.
     for (i, bound) in within.iter().enumerate() {
-        assert!(
-            *bound <= 0.15 || *bound == fine[i],
-            "pixel {i}: {bound}, {}",
-            fine[i]
-        );
+        let is_done = *bound <= most_bound || *bound == fine[i];
+        assert!(is_done, "pixel {i}: {bound}, {}", fine[i]);
     }
-    assert!(
-        within.iter().zip(&fine).any(|(b, fine)| b > fine),
-        "no more than asked for"
-    );
+    let mut pairs = within.iter().zip(&fine);
+    assert!(pairs.any(|(b, fine)| b > fine), "no more than asked for");
     views.end();
 }

@@ -54,12 +54,12 @@ figures:
 	cargo run --release $(EMBREE) --example make_figures -- out/figures
 
 study: figures
-	scripts/setup.sh bench
 	cargo build --release $(EMBREE)
-	$(BIN) bench --study benches/studies/$(STUDY).toml --out out/studies/$(STUDY) $(STUDY_OPTIONS)
+	for study in $(STUDY); do \
+		$(BIN) bench --study benches/studies/$$study.toml --out out/studies/$$study $(STUDY_OPTIONS) || exit 1; done
 
-studies: figures
-	for study in $(basename $(notdir $(wildcard benches/studies/*.toml))); do $(MAKE) study STUDY=$$study || exit 1; done
+studies:
+	$(MAKE) study STUDY="$(basename $(notdir $(wildcard benches/studies/*.toml)))"
 
 bench-plan:
 	scripts/setup.sh demo

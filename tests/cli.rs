@@ -134,6 +134,59 @@ fn a_capture_writes_picture_visibility_and_report() -> Result {
 }
 
 #[test]
+fn a_report_counts_tiles_and_has_the_bound() -> Result {
+    let folder = tempfile::tempdir()?;
+    let at = |name: &str| folder.path().join(name);
+    let report = |options: &[&str]| -> Result<Value> {
+        capture(
+            capture_command(SPHERE, "64x48")
+                .args(["--technique", "shaft-masks", "--repeat", "1"])
+                .args(options)
+                .arg("--visibility-bound")
+                .arg(at("bound.exr"))
+                .arg("--report")
+                .arg(at("report.json")),
+        )?;
+        let report: Value = serde_json::from_slice(&fs::read(at("report.json"))?)?;
+        Ok(report["images"][0].clone())
+    };
+    let few = report(&["--target-error", "none"])?;
+    let count = |entry: &Value, name: &str| entry["counters"][name].as_u64().unwrap_or(u64::MAX);
+    let penumbra = count(&few, "tiles_penumbra");
+    // Tiles of 8x8 pixels, of which those that span a gap in depth are two.
+    let tiles = penumbra + count(&few, "tiles_lit") + count(&few, "tiles_umbra");
+    assert!((1..=2 * 8 * 6).contains(&tiles), "{few}");
+    assert!(
+        penumbra > 0 && count(&few, "tile_entries") >= penumbra,
+        "{few}"
+    );
+    assert_eq!(
+        (count(&few, "tiles_256"), count(&few, "tiles_1024")),
+        (0, 0),
+        "{few}"
+    );
+
+    // It is of the pixels in the image.
+    let (_, _, mut bounds) = exr::read_channel(at("bound.exr"), "Y")?;
+    bounds.sort_by(f32::total_cmp);
+    let stated = |name: &str| few["bound"][name].as_f64().map(|bound| bound as f32);
+    assert_eq!(stated("max"), bounds.last().copied());
+    assert_eq!(stated("p99"), bounds.get(64 * 48 * 99 / 100).copied());
+    assert!(stated("max") > Some(0.0), "{few}");
+
+    let most = report(&["--target-error", "0"])?;
+    let [lit, umbra] = ["tiles_lit", "tiles_umbra"].map(|name| count(&most, name));
+    assert_eq!(
+        (lit, umbra),
+        (count(&few, "tiles_lit"), count(&few, "tiles_umbra"))
+    );
+    assert_eq!(count(&most, "tiles_1024"), penumbra, "{most}");
+    let error = |entry: &Value| count(entry, "estimated_error_millionths");
+    assert!(error(&most) < error(&few), "{most}");
+    Ok(())
+}
+
+#[test]
 fn formats_follow_the_ending() -> Result {
     let folder = tempfile::tempdir()?;
     let at = |name: &str| folder.path().join(name);

@@ -355,6 +355,7 @@ fn wrong_names_of_images_exit_2_and_list_the_right_ones() -> Result {
         ("gbuffer.ids[1]", &["1 layer(s)"]),
         ("gbuffer.ids[0,3]", &["1 mip level(s)"]),
         ("depth[0]", &["no image `depth[0]`"]),
+        ("counters", &["no image `counters`"]),
         // Made before the frame, not by it.
         ("scene.triangles", &["no image"]),
     ] {

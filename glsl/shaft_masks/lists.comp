@@ -38,7 +38,7 @@ layout(set = 0, binding = 12) uniform sampler2D view_depth;
 layout(set = 0, binding = 13, r32ui) uniform writeonly uimage2D estimates;
 
 // A software driver may end loops after 65,535 turns of all lanes of a vector together: a walk ends
-// itself before, and the passes on lists take it up where it ended.
+// itself before, and its tile is walked anew in pieces.
 const uint MOST_STEPS = 49152u;
 
 vec4 fetch_triangle_texel(uint texel) {
@@ -77,7 +77,7 @@ void main() {
     uint nodes = params.counts.z;
     uint first = 0u;
     uint count = 0u;
-    uint resume = nodes;
+    bool complete = true;
     uint chunk = 0u;
     uint slot = CHUNK;
     bool any = false;
@@ -99,7 +99,7 @@ void main() {
             if (slot == CHUNK) {
                 uint fresh = atomicAdd(chunks_used, 1u);
                 if (fresh >= params.counts.w) {
-                    resume = node;
+                    complete = false;
                     next = nodes;
                 } else if (count == 0u) {
                     first = fresh;
@@ -109,7 +109,7 @@ void main() {
                 chunk = fresh;
                 slot = 0u;
             }
-            if (resume == nodes) {
+            if (complete) {
                 imageStore(pool, chunk_entry_place(chunk, slot), uvec4(uint(low.w)));
                 slot += 1u;
                 count += 1u;
@@ -117,13 +117,13 @@ void main() {
         }
         node = next;
         if (steps == MOST_STEPS && node < nodes) {
-            resume = min(resume, node);
+            complete = false;
             node = nodes;
         }
     }
 
     vec2 depths = fetch_part_depths(part);
-    bool lit = !any && resume == nodes && shaft.low.w > 0.0;
+    bool lit = !any && complete && shaft.low.w > 0.0;
     if (lit) {
         imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(LEVEL_LIT));
         for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
@@ -139,6 +139,6 @@ void main() {
         atomicMax(penumbra.groups_x, min(at + 1u, TILE_ROW));
         atomicMax(penumbra.groups_y, at / TILE_ROW + 1u);
         imageStore(penumbra_list, tile_entry_place(at, tiles), uvec4(entry));
-        imageStore(lists, list_place(part), uvec4(first, count, resume, TILE_OPEN));
+        imageStore(lists, list_place(part), uvec4(first, count, complete ? nodes : 0u, TILE_OPEN));
     }
 }

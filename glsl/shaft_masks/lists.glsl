@@ -1,12 +1,12 @@
 // What is between a tile's surfaces and the light.
 //
 // The walk down the hierarchy lists candidates: chunks of a pool, linked, so that a list may have any
-// length. Where the pool is used up, or a walk long, a list says from which node on it does not know.
+// length. Where the pool is used up, or a walk long, the list is not used.
 // Entries for the masks are made from candidates and lie side by side.
 //
 // A long list is worked on in tasks of a fixed number of triangles. The first one is its tile's; the
-// others OR what they find to the tile's masks in memory. What a list does not know is found again
-// in the hierarchy, by tasks of a fixed number of nodes. That spreads the work, and a software
+// others OR what they find to the tile's masks in memory. For a tile without a list the hierarchy is
+// walked anew, by tasks of a fixed number of nodes. That spreads the work, and a software
 // driver may end loops that go on for long.
 #ifndef ANTUMBRA_SHAFT_MASKS_LISTS_GLSL
 #define ANTUMBRA_SHAFT_MASKS_LISTS_GLSL
@@ -19,7 +19,7 @@ const uint CHUNK = 31u;
 layout(constant_id = 4) const uint TASK_ENTRIES = 512u;
 
 // Texels of a tile in the image of lists, side by side: first chunk of candidates, their number, node
-// from which on they are missing, state; entries as below.
+// to walk from (beyond the last one if the list is whole, else 0), state; entries as below.
 const uint LIST_TEXELS = 3u;
 const uint TILE_OPEN = 0u;
 const uint TILE_SETTLED = 1u;

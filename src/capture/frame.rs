@@ -58,7 +58,7 @@ pub struct CapturedLight {
     pub visibility: Vec<f32>,
     /// Passes that made it.
     pub passes: Vec<String>,
-    /// What the technique counts of its work, by name; of frames with images brought back by name.
+    /// What the technique counts of its work, by name; of [`FrameRenderer::render_counted`](super::FrameRenderer::render_counted).
     pub counters: BTreeMap<String, u64>,
 }
 

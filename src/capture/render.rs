@@ -16,11 +16,18 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-/// Asks for counters, among names of images.
-const COUNTERS: &str = "counters";
-
 /// Name of the passes that copy images to the host: no part of the frame.
 const READ_BACK: &str = "read back";
+
+/// How a frame is rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Whole,
+    /// And the techniques' counts are brought back.
+    Counted,
+    /// With what techniques made in an earlier frame, where it fits.
+    Static,
+}
 
 /// Renders frames of a scene, and of the scenes that follow it in an animation.
 pub struct FrameRenderer<'s> {
@@ -93,8 +100,7 @@ impl<'s> FrameRenderer<'s> {
     /// along the view direction, 0 where nothing was hit), `normal` and `shading_normal` (world
     /// axes), `visibility` (of the first light), `visibility_bound` (the most that it is off, where the
     /// technique proves that), or any image that the frame writes, under its name
-    /// in the [`Plan`]; `NAME[LAYER]` and `NAME[LAYER,LEVEL]` are parts of it. `counters` is no image:
-    /// with it the lights' counters are filled in.
+    /// in the [`Plan`]; `NAME[LAYER]` and `NAME[LAYER,LEVEL]` are parts of it.
     ///
     /// # Errors
     /// As for [`render`](Self::render), and [`CaptureError::NoSuchImage`],
@@ -104,14 +110,23 @@ impl<'s> FrameRenderer<'s> {
         request: &FrameRequest,
         names: &[&str],
     ) -> Result<CapturedFrame, CaptureError> {
-        self.render_one(request, names, false)
+        self.render_one(request, names, Mode::Whole)
+    }
+
+    /// As [`render`](Self::render), and fills in the lights' counters, for which the device may do
+    /// more than it does for the picture.
+    pub fn render_counted(
+        &mut self,
+        request: &FrameRequest,
+    ) -> Result<CapturedFrame, CaptureError> {
+        self.render_one(request, &[], Mode::Counted)
     }
 
     /// As [`render`](Self::render), but what the technique made is kept, and used again while scene
     /// and request stay as they are: such a frame has no pass of the technique. Its counter
     /// `masks_kept` says for how many lights that was so.
     pub fn render_static(&mut self, request: &FrameRequest) -> Result<CapturedFrame, CaptureError> {
-        self.render_one(request, &[], true)
+        self.render_one(request, &[], Mode::Static)
     }
 
     /// `run` has waited: nobody uses them any more.
@@ -125,8 +140,9 @@ impl<'s> FrameRenderer<'s> {
         &mut self,
         request: &FrameRequest,
         names: &[&str],
-        reuse: bool,
+        mode: Mode,
     ) -> Result<CapturedFrame, CaptureError> {
+        let reuse = mode == Mode::Static;
         let most = self.gpu.info().limits.max_image_dimension2_d;
         let lights = check(&self.scene, request, most)?;
 
@@ -147,7 +163,7 @@ impl<'s> FrameRenderer<'s> {
             // Until the device has filled them they fit nothing.
             self.kept_filled = false;
         }
-        let wanted = ReadBacks::new(&graph, &frame, request, names)?;
+        let wanted = ReadBacks::new(&graph, &frame, request, names, mode == Mode::Counted)?;
         let aside = Instant::now();
         let (usage, location) = (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu);
         let target = (self.gpu).create_buffer(READ_BACK, wanted.bytes, usage, location)?;
@@ -263,11 +279,10 @@ impl ReadBacks {
         frame: &Frame,
         request: &FrameRequest,
         names: &[&str],
+        is_counted: bool,
     ) -> Result<Self, CaptureError> {
-        let is_counted = names.contains(&COUNTERS);
-        let images = names.iter().filter(|name| **name != COUNTERS);
         let find = |name: &&str| Dump::find(graph, frame, name);
-        let dumps: Vec<Dump> = images.map(find).collect::<Result<_, _>>()?;
+        let dumps: Vec<Dump> = names.iter().map(find).collect::<Result<_, _>>()?;
         let [width, height] = request.size;
         let picture = |image, texel_bytes| Source {
             image,

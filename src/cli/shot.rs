@@ -99,13 +99,7 @@ impl Shot {
         request: &FrameRequest,
         renderer: &mut FrameRenderer<'_>,
     ) -> Result<Self, CliError> {
-        let mut names = plan.dumps;
-        if plan.repeats.is_some() {
-            names.push("counters");
-        }
-        let mut captured = renderer.render_with_images(request, &names)?;
-        let counters = captured.lights.iter().map(|light| light.counters.clone());
-        let light_counters = counters.collect();
+        let mut captured = renderer.render_with_images(request, &plan.dumps)?;
         let first_frame = captured.frame_ms;
         let mut measured = Measurements::default();
         let mut measured_static = Measurements::default();
@@ -129,6 +123,16 @@ impl Shot {
             }
         }
         let memory = renderer.gpu().memory_use();
+        // After all that is measured: counting takes work of its own.
+        let mut light_counters = vec![BTreeMap::new(); captured.lights.len()];
+        if plan.repeats.is_some() {
+            let counted = renderer.render_counted(request)?;
+            light_counters = counted
+                .lights
+                .into_iter()
+                .map(|light| light.counters)
+                .collect();
+        }
         let scene = renderer.scene();
         let lights = request.lights.iter();
         Ok(Self {

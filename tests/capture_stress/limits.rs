@@ -134,7 +134,7 @@ pub fn leak(technique: Technique) -> f32 {
     }
 }
 
-/// Techniques that are not finished, and not tested here before they are.
+/// Techniques that do not hold yet, and are not tested here before they do.
 ///
 /// The relations are asked on Mesa, cases by themselves on SwiftShader too. Of the relations SwiftShader, with a
 /// sixteenth of the sub-texel steps, breaks some: `pcss` in `far-and-near` turned (59 of 3215 pixels),

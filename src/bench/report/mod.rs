@@ -137,7 +137,6 @@ pub(super) mod tests {
     use crate::measure::{ErrorMeasures, Measures};
 
     /// One scene with an odd name, a technique with a result and one that crashed.
-    /// A cell with a result and one that crashed.
     pub(in crate::bench) fn results() -> Results {
         let techniques = vec!["hard".to_string(), "rays:4".to_string()];
         let job = Job {

@@ -121,7 +121,7 @@ pub(super) fn add_buffer<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
     options: &DbufferOptions,
-    unused: DbufferParams,
+    coverage: DbufferParams,
 ) -> ShadowMask {
     let name = &inputs.light_name;
     let base = format!("{NAME}.hard");
@@ -134,7 +134,7 @@ pub(super) fn add_buffer<'f>(
     );
     let params = BufferParams::new(inputs, &views, options.resolution);
     let params = add_uniform(graph, format!("{NAME}.views {name}"), params);
-    let unused = add_uniform(graph, format!("{NAME}.params {name}"), unused);
+    let coverage = add_uniform(graph, format!("{NAME}.params {name}"), coverage);
     let target = DrawTarget::Ids;
     let map = add_maps_of_size(graph, inputs, NAME, &views, target, options.resolution);
     let ShadowMap { ids: Some(map), .. } = map else {
@@ -151,7 +151,7 @@ pub(super) fn add_buffer<'f>(
         umbra: drawn.add_surface(graph, inputs, options, true),
         penumbra: drawn.add_surface(graph, inputs, options, false),
     };
-    add_visibility(graph, inputs, options, [unused, params], hard, &surfaces)
+    add_visibility(graph, inputs, options, [coverage, params], hard, &surfaces)
 }
 
 impl Drawn<'_> {
@@ -270,7 +270,7 @@ fn add_visibility<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
     options: &DbufferOptions,
-    [unused, params]: [BufferId; 2],
+    [coverage, params]: [BufferId; 2],
     hard: ImageId,
     surfaces: &Surfaces,
 ) -> ShadowMask {
@@ -284,7 +284,7 @@ fn add_visibility<'f>(
     let layers: [[ImageId; MOST_LAYERS]; 2] = [bound(&surfaces.umbra), bound(&surfaces.penumbra)];
     let mut pass = graph.pass(format!("{NAME}.visibility {name}"), PassKind::Compute);
     pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
-    pass.read(unused, Access::Uniform(Stage::Compute));
+    pass.read(coverage, Access::Uniform(Stage::Compute));
     pass.read(params, Access::Uniform(Stage::Compute));
     let images = [
         gbuffer.view_depth,
@@ -316,7 +316,7 @@ fn add_visibility<'f>(
         let nearest = SamplerDesc::nearest();
         let mut bindings = vec![
             Bind::uniform(0, view_params).part(part),
-            Bind::uniform(1, unused),
+            Bind::uniform(1, coverage),
             Bind::uniform(2, params),
             Bind::sampled(3, gbuffer.view_depth, nearest),
             Bind::sampled(4, gbuffer.ids, nearest),

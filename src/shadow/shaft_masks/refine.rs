@@ -153,34 +153,37 @@ impl Refining {
         if by_bound {
             (bound, made.estimates) = first.add_bound(graph, inputs, bound, made.estimates);
         }
-        let mut lists = first.lists;
+        let Masks {
+            nodes,
+            shafts,
+            mut lists,
+            sizes,
+            ..
+        } = first;
+        let [across, down] = tile_counts(inputs.camera.size());
+        let parts = across * down * PARTS;
         let mut all = vec![first];
         let sides = [2 * BLOCK, MOST_SIDE];
         for side in sides.into_iter().filter(|side| *side > options.side) {
             let blocks = (side / BLOCK).pow(2);
-            let sizes = Sizes {
-                blocks,
-                ..all[0].sizes
-            };
+            let sizes = Sizes { blocks, ..sizes };
             let label = format!("_{}", side * side);
             let params = add_params(graph, inputs, &sizes, side, &format!("params{label}"));
-            let [across, down] = tile_counts(inputs.camera.size());
-            let capacity = (ROUND_WORDS / words_of_tile(blocks)).min(across * down * PARTS);
-            let full = (across * down * PARTS).div_ceil(capacity);
+            let capacity = (ROUND_WORDS / words_of_tile(blocks)).min(parts);
+            let full = parts.div_ceil(capacity);
             let rounds = match options.budget_ms {
                 Some(_) => full.max(TIMED_ROUNDS),
                 None => full,
             };
             for goal in &goals {
                 for round in 0..rounds {
-                    let Some(last) = all.last() else { continue };
                     let mut masks = Masks {
                         sizes,
                         label: label.clone(),
                         slots: capacity,
                         params,
-                        nodes: last.nodes,
-                        shafts: last.shafts,
+                        nodes,
+                        shafts,
                         lists,
                     };
                     // Without a clock a round takes what it can.
@@ -278,7 +281,7 @@ impl Choice<'_> {
             None => spent,
         };
         let (name, label) = (&inputs.light_name, masks.label.clone());
-        let [across, down] = tile_counts(inputs.camera.size());
+        let [_, down] = tile_counts(inputs.camera.size());
         let sizes = masks.sizes;
         let mut selected = part_list(graph, inputs, &format!("selected{label}"));
         let mut partial = part_list(graph, inputs, &format!("partial{label}"));
@@ -332,7 +335,6 @@ impl Choice<'_> {
             most_ms: self.options.budget_ms.unwrap_or(f32::MAX),
             parts_down: down * PARTS,
         };
-        let _ = across;
         let task_entries = sizes.task_entries;
         pass.record(move |ctx| {
             push.tick_ms = ctx.gpu().tick_ms();

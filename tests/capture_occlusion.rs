@@ -52,14 +52,17 @@ fn half_plane_error(image: &[f32], depth: f32) -> f32 {
     errors.fold(0.0, f32::max)
 }
 
-/// Slices of a third of 10 m, from a plate far to the side on: planes at 3.33, 5, 6.67, .. metres.
+/// Slices with planes at 3.34, 5, 6.66, .. metres: two plates, where the half-plane hides them from
+/// all that they could darken, say where the first begins and the last ends.
 fn half_plane_in_slices(depth: f32) -> Scene {
-    let near = 10.0 / 3.0;
+    let far = 9.99;
+    let near = (4.0 * 5.0 - far) / 3.0;
     scene(
         vec![
             floor(),
             plate("blocker", [-30.0, 0.0], [-30.0, 30.0], depth),
-            plate("far aside", [8.0, 8.1], [0.0, 0.1], near),
+            plate("nearest", [-1.19, -1.1], [0.0, 0.05], near),
+            plate("farthest", [-1.5, -1.4], [0.0, 0.05], far),
         ],
         square(1.0),
     )
@@ -365,8 +368,8 @@ fn a_larger_light_costs_no_more() {
     // Blockers everywhere, so that every kernel has something in it.
     let mut primitives = vec![floor()];
     for (row, depth) in [3.0_f32, 5.0, 7.0].into_iter().enumerate() {
-        for i in -60..60 {
-            let x = 0.5 * i as f32 + 0.1 * row as f32;
+        for i in -120..120 {
+            let x = 0.25 * i as f32 + 0.1 * row as f32;
             primitives.push(plate("bar", [x, x + 0.05], [-20.0, 20.0], depth));
         }
     }

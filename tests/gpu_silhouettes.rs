@@ -166,6 +166,7 @@ fn found(scene: &Scene, light: AreaLight, rule: SilhouetteRule) -> Vec<Edge> {
             },
         ),
         receivers: Vec::new(),
+        casters: vec![true; buffers.draws().len()].into(),
         scene: &buffers,
         ids,
     };

@@ -23,7 +23,11 @@ uvec2 pick(uvec4 texel, uvec2 component) {
     return uvec2(texel[component.x], texel[component.y]);
 }
 
-// Differences of a row of a table: x of the whole columns of a box, y of the column after them, z of
+uvec2 table_sums(usampler2DArray tables, int x, int y, int layer, Sums sums) {
+    return pick(texelFetch(tables, ivec3(x, y, layer), 0), sums.component);
+}
+
+// Differences of a row of a table: of the whole columns of a box, of the column after them, and of
 // its first column.
 struct Row {
     uvec2 whole;
@@ -31,12 +35,12 @@ struct Row {
     uvec2 less;
 };
 
-Row table_row(usampler2DArray tables, ivec2 first, int last, int layer, Sums sums) {
-    uvec2 left = pick(texelFetch(tables, ivec3(first, layer), 0), sums.component);
-    uvec2 left_next = pick(texelFetch(tables, ivec3(first.x + 1, first.y, layer), 0), sums.component);
-    uvec2 right = pick(texelFetch(tables, ivec3(last, first.y, layer), 0), sums.component);
-    uvec2 right_next = pick(texelFetch(tables, ivec3(last + 1, first.y, layer), 0), sums.component);
-    return Row(right - left, right_next - right, left_next - left);
+// A row of the table from the sums at its ends, left of the first column and right of the last.
+Row table_row(usampler2DArray tables, uvec2 left, uvec2 right, ivec3 first_last_y, int layer,
+    Sums sums) {
+    uvec2 left_next = table_sums(tables, first_last_y.x + 1, first_last_y.z, layer, sums);
+    uvec2 right_before = table_sums(tables, first_last_y.y, first_last_y.z, layer, sums);
+    return Row(right_before - left, right - right_before, left_next - left);
 }
 
 // The difference of two rows, with fractions of the columns at its ends. What fractions take away
@@ -49,18 +53,36 @@ vec2 row_sum(Row a, Row b, vec2 fractions, Sums sums, out vec2 most) {
     return whole + more * fractions.y - less * fractions.x;
 }
 
-// Sums of two groups of a layer over a box; low and high in texels, 0 to side.
-vec2 box_sums(usampler2DArray tables, int layer, Sums sums, vec2 low, vec2 high, float side) {
+// Sums of two groups of a layer over a box; low and high in texels, 0 to side. Where nothing in the
+// texels that the box touches counts, most of it is not looked at and both are 0: where both groups
+// have nothing, and for `by_difference` also where they have the same.
+vec2 box_sums(usampler2DArray tables, int layer, Sums sums, vec2 low, vec2 high, float side,
+    bool by_difference, inout float fetched) {
     vec2 first = min(floor(low), side - 1.0);
     vec2 last = min(floor(high), side - 1.0);
     vec2 before = low - first;
     vec2 beyond = high - last;
     ivec2 from = ivec2(first);
     ivec2 to = ivec2(last);
-    Row top = table_row(tables, from, to.x, layer, sums);
-    Row top_next = table_row(tables, ivec2(from.x, from.y + 1), to.x, layer, sums);
-    Row bottom = table_row(tables, ivec2(from.x, to.y), to.x, layer, sums);
-    Row bottom_next = table_row(tables, ivec2(from.x, to.y + 1), to.x, layer, sums);
+    uvec2 top_left = table_sums(tables, from.x, from.y, layer, sums);
+    uvec2 top_right = table_sums(tables, to.x + 1, from.y, layer, sums);
+    uvec2 bottom_left = table_sums(tables, from.x, to.y + 1, layer, sums);
+    uvec2 bottom_right = table_sums(tables, to.x + 1, to.y + 1, layer, sums);
+    uvec2 outer = (bottom_right - bottom_left - top_right + top_left) >> sums.shift & sums.mask;
+    fetched += 4.0;
+    if (outer.x == outer.y && (by_difference || outer.y == 0u)) {
+        return vec2(0.0);
+    }
+    fetched += 12.0;
+    uvec2 left = table_sums(tables, from.x, from.y + 1, layer, sums);
+    uvec2 right = table_sums(tables, to.x + 1, from.y + 1, layer, sums);
+    Row top = table_row(tables, top_left, top_right, ivec3(from.x, to.x, from.y), layer, sums);
+    Row top_next = table_row(tables, left, right, ivec3(from.x, to.x, from.y + 1), layer, sums);
+    left = table_sums(tables, from.x, to.y, layer, sums);
+    right = table_sums(tables, to.x + 1, to.y, layer, sums);
+    Row bottom = table_row(tables, left, right, ivec3(from.x, to.x, to.y), layer, sums);
+    Row bottom_next = table_row(tables, bottom_left, bottom_right, ivec3(from.x, to.x, to.y + 1),
+        layer, sums);
     vec2 columns = vec2(before.x, beyond.x);
     vec2 most;
     vec2 most_more;
@@ -72,6 +94,15 @@ vec2 box_sums(usampler2DArray tables, int layer, Sums sums, vec2 low, vec2 high,
     // Rounding must not darken what nothing blocks.
     most += most_more;
     return mix(vec2(0.0), sum, greaterThan(sum, 2.0e-6 * most));
+}
+
+// Whether a group's sum is 0 in all texels that a box touches.
+bool box_is_empty(usampler2DArray tables, int layer, Sums sums, vec2 low, vec2 high, float side) {
+    ivec2 from = ivec2(clamp(floor(low), vec2(0.0), vec2(side - 1.0)));
+    ivec2 to = ivec2(clamp(floor(high), vec2(0.0), vec2(side - 1.0))) + 1;
+    uvec2 sum = table_sums(tables, to.x, to.y, layer, sums) - table_sums(tables, from.x, to.y, layer, sums)
+        - table_sums(tables, to.x, from.y, layer, sums) + table_sums(tables, from.x, from.y, layer, sums);
+    return (sum.x >> sums.shift.x & sums.mask) == 0u;
 }
 
 #endif

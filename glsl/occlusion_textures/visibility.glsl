@@ -105,20 +105,19 @@ uvec4 slices_in_box(vec2 low, vec2 high) {
         | texelFetch(any_slices, ivec2(to.x, from.y), level);
 }
 
-// Those that kernels from one plane to the receiver can touch.
-uvec4 slices_within(Receiver at, vec4 first_plane) {
-    Kernel a = kernel_at(at, first_plane.x, first_plane.w);
-    Kernel b = kernel_at(at, at.v.z, occlusion_inverse(slice_view, at.v.z));
-    return slices_in_box(min(a.low, b.low), max(a.high, b.high));
-}
-
 float fetched = 0.0; // texture accesses of filters
 
 // Defined by the entry file. x: mean of what the group blocks over a kernel, y: of what it and all
 // before it block.
 vec2 blocked(uint group, Kernel kernel);
+bool is_empty(vec2 low, vec2 high);         // whether no group blocks anything in a box; false: unknown
+bool may_block(uint group, Kernel kernel);  // false where `blocked` is 0 and that is quickly seen
 float blocked_before(uint group, Kernel kernel);
 float texture_side(); // texels
+
+bool holds_anything(uint group, Kernel kernel) {
+    return (slices_in_box(kernel.low, kernel.high) & groups.masks[group]) != uvec4(0u);
+}
 
 vec3 axes_of(vec3 q) {
     return vec3(dot(q, slice_view.right.xyz), dot(q, slice_view.up.xyz), dot(q, slice_view.forward.xyz));
@@ -203,7 +202,15 @@ float through_slices(Receiver at) {
     if (count == 0u) {
         return 1.0;
     }
-    uvec4 present = slices_within(at, groups.planes[0]);
+    // All that kernels from the first plane to the receiver can touch.
+    Kernel first = kernel_at(at, groups.planes[0].x, groups.planes[0].w);
+    Kernel own = kernel_at(at, at.v.z, occlusion_inverse(slice_view, at.v.z));
+    vec2 low = min(first.low, own.low);
+    vec2 high = max(first.high, own.high);
+    uvec4 present = slices_in_box(low, high);
+    if (present == uvec4(0u) || is_empty(low, high)) {
+        return 1.0;
+    }
     bool with_rays = CONTACT > 0u && FINE > count;
     float product = 1.0;
     float least = 1.0;
@@ -235,7 +242,7 @@ float through_slices(Receiver at) {
         }
         // All between the light and the receiver is a long strip where the light shines in flat: most
         // groups hold something there and nothing in their own kernel.
-        if ((slices_in_box(kernel.low, kernel.high) & groups.masks[group]) == uvec4(0u)) {
+        if (!may_block(group, kernel)) {
             continue;
         }
         vec2 mean = blocked(group, kernel);

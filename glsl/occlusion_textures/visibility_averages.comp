@@ -41,6 +41,14 @@ vec2 square(uint group, vec2 middle, float size) {
 }
 
 // A longish kernel takes several squares.
+bool is_empty(vec2 low, vec2 high) {
+    return false;
+}
+
+bool may_block(uint group, Kernel kernel) {
+    return holds_anything(group, kernel);
+}
+
 vec2 blocked(uint group, Kernel kernel) {
     vec2 size = kernel.high - kernel.low;
     vec2 middle = 0.5 * (kernel.high + kernel.low);

@@ -45,6 +45,18 @@ pub fn draw_scene(
     clip_from_scene: &Mat4,
     target: DrawTarget,
 ) -> Result<(), GpuError> {
+    draw_part(ctx, scene, ids, clip_from_scene, target, |_| true)
+}
+
+/// As [`draw_scene`], of those of [`SceneBuffers::draws`] that `keep` names by their index.
+pub fn draw_part(
+    ctx: &mut PassContext<'_>,
+    scene: &SceneBuffers,
+    ids: &SceneIds,
+    clip_from_scene: &Mat4,
+    target: DrawTarget,
+    keep: impl Fn(usize) -> bool,
+) -> Result<(), GpuError> {
     let depth = Some(DepthState {
         compare: vk::CompareOp::GREATER,
         write: true,
@@ -76,19 +88,27 @@ pub fn draw_scene(
         masked,
     };
     let clip_from_scene = *clip_from_scene;
-    draw_scene_with(ctx, scene, ids, &clip_from_scene, shaders, |material| {
-        let Some(material) = material else {
-            return bytemuck::bytes_of(&clip_from_scene).to_vec();
-        };
-        let push = MaskedPush {
-            clip_from_scene: clip_from_scene.to_cols_array_2d(),
-            material,
-        };
-        bytemuck::bytes_of(&push).to_vec()
-    })
+    draw_part_with(
+        ctx,
+        scene,
+        ids,
+        &clip_from_scene,
+        shaders,
+        keep,
+        |material| {
+            let Some(material) = material else {
+                return bytemuck::bytes_of(&clip_from_scene).to_vec();
+            };
+            let push = MaskedPush {
+                clip_from_scene: clip_from_scene.to_cols_array_2d(),
+                material,
+            };
+            bytemuck::bytes_of(&push).to_vec()
+        },
+    )
 }
 
-/// What [`draw_scene_with`] draws with.
+/// What [`draw_part_with`] draws with.
 #[derive(Clone, Debug)]
 pub struct SceneShaders {
     /// For solid triangles; its first vertex stream is of [`SceneIds::vertices`].
@@ -98,18 +118,23 @@ pub struct SceneShaders {
     pub masked: GraphicsPipelineDesc,
 }
 
-/// Draws all triangles that a view may see into the pass's attachments. `push` makes the push
-/// constants, for masked triangles those of a material. The pass has declared [`read_for_draw`].
-pub fn draw_scene_with(
+/// Draws all triangles that a view may see, of those of [`SceneBuffers::draws`] that `keep` names by
+/// their index, into the pass's attachments. `push` makes the push constants, for masked triangles
+/// those of a material. The pass has declared [`read_for_draw`].
+pub fn draw_part_with(
     ctx: &mut PassContext<'_>,
     scene: &SceneBuffers,
     ids: &SceneIds,
     clip_from_scene: &Mat4,
     shaders: SceneShaders,
+    keep: impl Fn(usize) -> bool,
     push: impl Fn(Option<u32>) -> Vec<u8>,
 ) -> Result<(), GpuError> {
-    let seen = |draw: &&Draw| frustum_sees(clip_from_scene, &draw.bounds);
-    let seen: Vec<&Draw> = scene.draws().iter().filter(seen).collect();
+    let draws = scene.draws().iter().enumerate();
+    let seen: Vec<&Draw> = draws
+        .filter(|(index, draw)| keep(*index) && frustum_sees(clip_from_scene, &draw.bounds))
+        .map(|(_, draw)| draw)
+        .collect();
     let runs = runs(&seen);
     let (masked, solid): (Vec<&Run>, Vec<&Run>) = runs.iter().partition(|run| run.mask.is_some());
     if !solid.is_empty() {

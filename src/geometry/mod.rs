@@ -9,6 +9,8 @@
 
 mod adjacency;
 mod camera;
+mod convex;
+mod cover;
 mod draw;
 mod gbuffer;
 mod hierarchy;
@@ -20,7 +22,9 @@ mod tiles;
 mod visible;
 
 pub use camera::{PixelCamera, frustum_sees};
-pub use draw::{DrawTarget, SceneShaders, draw_scene, draw_scene_with, read_for_draw};
+pub use convex::{HalfSpace, box_faces, clip};
+pub use cover::Cover;
+pub use draw::{DrawTarget, SceneShaders, draw_part, draw_part_with, draw_scene, read_for_draw};
 pub use gbuffer::{GBuffer, add_gbuffer, add_triangle_ids};
 pub use scene_buffers::{Draw, SceneBuffers, SceneIds, UploadError};
 pub use scene_layout::image_place;

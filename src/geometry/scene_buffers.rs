@@ -1,6 +1,7 @@
 //! The scene on the device: vertices and indices to draw, triangles and materials to look up.
 
 use super::adjacency::Adjacency;
+use super::cover::Cover;
 use super::hierarchy;
 use super::neighbours::neighbours;
 use super::scene_layout::{IMAGE_WIDTH, Layout, Vertex};
@@ -75,6 +76,7 @@ pub struct SceneBuffers {
     device: Option<DeviceBuffers>,
     sizes: Sizes,
     draws: Vec<Draw>,
+    covers: Vec<Cover>,
     bounds: Aabb,
     triangles: usize,
     degenerate: usize,
@@ -214,6 +216,7 @@ impl SceneBuffers {
                 ],
             },
             draws: layout.draws.clone(),
+            covers: layout.covers.clone(),
             bounds: scene.bounds,
             triangles: layout.indices.len() / 3,
             degenerate: layout.degenerate,
@@ -338,6 +341,11 @@ impl SceneBuffers {
     /// Chunks of neighbouring triangles, masked ones first.
     pub fn draws(&self) -> &[Draw] {
         &self.draws
+    }
+
+    /// The largest flat parts that hide what lies behind them, largest first.
+    pub fn covers(&self) -> &[Cover] {
+        &self.covers
     }
 
     /// Box around all vertices, scene space.

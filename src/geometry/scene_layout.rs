@@ -1,5 +1,6 @@
 //! A scene laid out for the device, before it is there.
 
+use super::cover::Cover;
 use super::scene_buffers::Draw;
 use super::tight_box::tight_box;
 use crate::scene::{Aabb, Material, Primitive, Scene, Wrap};
@@ -42,6 +43,8 @@ pub(super) struct Layout {
     pub texels: Vec<[u8; 4]>,
     /// Neighbouring triangles of one primitive, with the box around them.
     pub draws: Vec<Draw>,
+    /// The largest flat parts that hide what is behind them.
+    pub covers: Vec<Cover>,
     /// Triangles that no ray meets and no pixel shows: without area, or cut out as a whole.
     pub degenerate: usize,
     scene_radius: f32,
@@ -52,6 +55,8 @@ pub(super) struct Layout {
 const CHUNKS: usize = 512;
 /// Fewest triangles of a chunk.
 const LEAST_IN_CHUNK: usize = 4;
+/// Flat parts that are kept to look for what they hide: each is compared with all boxes.
+const MOST_COVERS: usize = 8;
 /// Part of the scene's size from which on a chunk is looked at for being mostly empty.
 const LARGE: f32 = 0.1;
 
@@ -85,6 +90,8 @@ impl Layout {
                 }
             }
         }
+        layout.covers.sort_by(|a, b| b.area().total_cmp(&a.area()));
+        layout.covers.truncate(MOST_COVERS);
         layout
     }
 
@@ -205,6 +212,9 @@ impl Layout {
                 self.triangle_uvs.push([au, av, bu, bv]);
                 self.triangle_uvs.push([cu, cv, 0.0, 0.0]);
             }
+        }
+        if kind != Kind::Masked {
+            self.covers.extend(Cover::of(&drawn));
         }
         self.draws.push(Draw {
             first_index: first_index as u32,

@@ -1,30 +1,29 @@
 //! What part of a scene a camera can see, as convex hulls.
 
+use super::convex::{HalfSpace, box_faces, clip};
+use super::cover::Cover;
 use crate::scene::SceneCamera;
 use glam::{DVec3, Vec3};
 
-/// A half-space: points with `dot(normal, p) <= offset`.
-#[derive(Clone, Copy, Debug)]
-struct HalfSpace {
-    normal: DVec3,
-    offset: f64,
-}
-
-impl HalfSpace {
-    fn distance(&self, point: DVec3) -> f64 {
-        self.normal.dot(point) - self.offset
-    }
-}
-
 /// The parts of boxes, given by their corners (x changing fastest, then y), that lie in a camera's
 /// frustum (without far plane), as points whose convex hull holds them; none for a box out of view.
-/// Scene space, metres.
+/// What lies behind one of `covers` and is hidden by it is left out: roots below ground, a body's
+/// parts that stand in a wall. Scene space, metres.
 pub fn visible_hulls(
     camera: &SceneCamera,
     size: [u32; 2],
     boxes: impl IntoIterator<Item = [Vec3; 8]>,
+    covers: &[Cover],
 ) -> Vec<Vec<DVec3>> {
     let planes = frustum(camera, size);
+    let eye = camera.position.as_dvec3();
+    let covers: Vec<(&Cover, HalfSpace)> = covers
+        .iter()
+        .filter_map(|cover| {
+            let (normal, offset) = cover.behind(eye)?;
+            Some((cover, HalfSpace { normal, offset }))
+        })
+        .collect();
     boxes
         .into_iter()
         .filter(|corners| corners.iter().all(|corner| corner.is_finite()))
@@ -36,17 +35,48 @@ pub fn visible_hulls(
             if planes.iter().any(beyond) {
                 return Vec::new();
             }
-            if planes.iter().all(within) {
+            let in_front = |(_, plane): &(&Cover, HalfSpace)| within(plane);
+            if planes.iter().all(within) && covers.iter().all(in_front) {
                 return corners.to_vec();
             }
             let mut faces = box_faces(&corners);
             for plane in &planes {
                 clip(&mut faces, plane);
             }
+            for (cover, plane) in &covers {
+                leave_out_hidden(&mut faces, cover, plane, camera);
+            }
             faces.into_iter().flatten().collect::<Vec<_>>()
         })
         .filter(|points: &Vec<_>| !points.is_empty())
         .collect()
+}
+
+/// Cuts off what lies behind a cover, if all of it is hidden.
+fn leave_out_hidden(
+    faces: &mut Vec<Vec<DVec3>>,
+    cover: &Cover,
+    behind: &HalfSpace,
+    camera: &SceneCamera,
+) {
+    let mut points = faces.iter().flatten();
+    if points.all(|p| behind.distance(*p) <= 0.0) {
+        return;
+    }
+    let mut hidden = faces.clone();
+    let other_side = HalfSpace {
+        normal: -behind.normal,
+        offset: -behind.offset,
+    };
+    clip(&mut hidden, &other_side);
+    let eye = camera.position.as_dvec3();
+    let forward = camera.forward.as_dvec3();
+    let near = f64::from(camera.znear);
+    // Points at the plane itself are as far behind it as rounding allows.
+    let mut points = hidden.iter().flatten();
+    if points.all(|p| cover.hides(*p, eye, forward, near)) {
+        clip(faces, behind);
+    }
 }
 
 /// The four sides and the near plane, a pixel wider than the picture on each side.
@@ -70,58 +100,6 @@ fn frustum(camera: &SceneCamera, size: [u32; 2]) -> [HalfSpace; 5] {
             offset: -forward.dot(eye) - f64::from(camera.znear),
         },
     ]
-}
-
-/// The six faces of a box as polygons.
-fn box_faces(corners: &[DVec3; 8]) -> Vec<Vec<DVec3>> {
-    let faces = [
-        [0, 1, 3, 2],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 3, 7, 6],
-        [0, 2, 6, 4],
-        [1, 3, 7, 5],
-    ];
-    faces.map(|face| face.map(|i| corners[i]).to_vec()).to_vec()
-}
-
-/// Cuts a convex polyhedron, given by its faces, by a half-space, and closes the cut. Only the hull
-/// of the result counts, so the points of the cut need no order.
-fn clip(faces: &mut Vec<Vec<DVec3>>, plane: &HalfSpace) {
-    let mut cut = Vec::new();
-    for face in faces.iter_mut() {
-        let mut kept = Vec::with_capacity(face.len() + 1);
-        for (i, &from) in face.iter().enumerate() {
-            let to = face[(i + 1) % face.len()];
-            let (a, b) = (plane.distance(from), plane.distance(to));
-            if a <= 0.0 {
-                kept.push(from);
-            }
-            if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
-                let point = from + (to - from) * (a / (a - b));
-                kept.push(point);
-                cut.push(point);
-            }
-        }
-        *face = kept;
-    }
-    faces.retain(|face| !face.is_empty());
-    if let Some(closing) = in_order(cut, plane.normal) {
-        faces.push(closing);
-    }
-}
-
-/// Points of a convex polygon across `normal`, sorted around their middle.
-fn in_order(mut points: Vec<DVec3>, normal: DVec3) -> Option<Vec<DVec3>> {
-    if points.len() < 3 {
-        return None;
-    }
-    let middle = points.iter().sum::<DVec3>() / points.len() as f64;
-    let x = normal.normalize_or(DVec3::Z).any_orthonormal_vector();
-    let y = normal.normalize_or(DVec3::Z).cross(x);
-    let angle = |p: &DVec3| (*p - middle).dot(y).atan2((*p - middle).dot(x));
-    points.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
-    Some(points)
 }
 
 #[cfg(test)]
@@ -151,7 +129,12 @@ mod tests {
             min: Vec3::new(-1.0, -1.0, 6.0),
             max: Vec3::new(1.0, 1.0, 8.0),
         };
-        let hulls = visible_hulls(&camera(), [64, 64], [inside, behind].map(|b| b.corners()));
+        let hulls = visible_hulls(
+            &camera(),
+            [64, 64],
+            [inside, behind].map(|b| b.corners()),
+            &[],
+        );
         assert_eq!(hulls.len(), 1);
         for corner in inside.corners() {
             assert!(hulls[0].contains(&corner.as_dvec3()));
@@ -166,7 +149,7 @@ mod tests {
             min: Vec3::new(-100.0, -1.2, -100.0),
             max: Vec3::new(100.0, -1.0, 100.0),
         };
-        let hulls = visible_hulls(&camera(), [64, 64], [floor.corners()]);
+        let hulls = visible_hulls(&camera(), [64, 64], [floor.corners()], &[]);
         let points = &hulls[0];
         let planes = frustum(&camera(), [64, 64]);
         for point in points {
@@ -189,5 +172,35 @@ mod tests {
             };
             assert!(reach(points) >= reach(&seen) - 1.0e-9);
         }
+    }
+
+    #[test]
+    fn what_a_floor_hides_is_left_out() {
+        let floor = [[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0]].map(|[x, z]| {
+            // Seen from above and in front.
+            Vec3::new(x, -1.0, z)
+        });
+        let cover = Cover::of(&[
+            [floor[0], floor[1], floor[2]],
+            [floor[0], floor[2], floor[3]],
+        ]);
+        let post = |x: f32| {
+            let (min, max) = (Vec3::new(x, -1.5, -0.1), Vec3::new(x + 0.2, 0.5, 0.1));
+            Aabb { min, max }.corners()
+        };
+        let hulls = visible_hulls(
+            &camera(),
+            [64, 64],
+            [post(0.0), post(3.5)],
+            cover.as_slice(),
+        );
+        let lowest = |points: &Vec<DVec3>| points.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+        assert!(
+            (lowest(&hulls[0]) + 1.0).abs() < 1.0e-4,
+            "{}",
+            lowest(&hulls[0])
+        );
+        // One beside the floor shows all of itself.
+        assert!((lowest(&hulls[1]) + 1.5).abs() < 1.0e-6);
     }
 }

@@ -22,7 +22,7 @@ use crate::geometry::{add_gbuffer, add_tile_bounds};
 use crate::graph::{Access, BufferDesc, BufferId, BufferPart, Graph, ImageId, PassKind};
 use crate::light::AreaLight;
 use crate::scene::SceneCamera;
-use crate::shadow::{LightParams, ShadowInputs, ShadowMask, Technique, ViewParams};
+use crate::shadow::{LightParams, ShadowInputs, ShadowMask, Technique, ViewParams, casters};
 use std::ops::Range;
 
 /// A light with the name that its passes and files get.
@@ -79,8 +79,9 @@ pub fn add_visibility<'f>(
     let pixels = PixelCamera::new(camera, size);
     let (params, parts) = add_params(graph, pixels, lights);
     let tile_bounds = add_tile_bounds(graph, &gbuffer, size);
-    let boxes = scene.draws().iter().map(|draw| draw.bounds.corners());
-    let receivers = visible_hulls(camera, size, boxes);
+    // Boxes that turn with the triangles grow less around what is turned.
+    let boxes = scene.draws().iter().map(|draw| draw.corners);
+    let receivers = visible_hulls(camera, size, boxes, scene.covers());
     let mut masks = Vec::with_capacity(lights.len());
     let mut passes = Vec::with_capacity(lights.len());
     for (light, part) in lights.iter().zip(&parts) {
@@ -96,6 +97,7 @@ pub fn add_visibility<'f>(
                 tile_bounds,
                 view_params: (params, *part),
                 receivers: receivers.clone(),
+                casters: casters(&light.light, &receivers, scene),
                 scene,
                 ids,
             },

@@ -1,10 +1,11 @@
-//! Maps of what a light's centre sees.
+//! Maps of what a light's centre sees, of all that can block it.
 
 use super::ShadowInputs;
 use super::light_view::LightViews;
-use crate::geometry::{DrawTarget, draw_scene, read_for_draw};
+use crate::geometry::{DrawTarget, draw_part, read_for_draw};
 use crate::graph::{Graph, ImageDesc, ImageId, ImagePart, Load, PassKind};
 use ash::vk;
+use std::rc::Rc;
 
 /// Width and height of each map in texels.
 pub const MAP_SIZE: u32 = 2048;
@@ -39,6 +40,19 @@ pub(super) fn add_maps_of_size<'f>(
     target: DrawTarget,
     size: u32,
 ) -> ShadowMap {
+    let casters = Rc::clone(&inputs.casters);
+    add_maps_of(graph, inputs, technique, views, target, (size, casters))
+}
+
+/// As [`add_maps_of_size`], of those of the scene's draws that are asked for.
+pub(super) fn add_maps_of<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    technique: &str,
+    views: &LightViews,
+    target: DrawTarget,
+    (size, draws): (u32, Rc<[bool]>),
+) -> ShadowMap {
     let name = &inputs.light_name;
     let layers = views.views.len().max(1) as u32;
     let side = if views.views.is_empty() { 1 } else { size };
@@ -62,7 +76,11 @@ pub(super) fn add_maps_of_size<'f>(
         };
         read_for_draw(&mut pass, scene, &inputs.ids);
         let scene_ids = inputs.ids;
-        pass.record(move |ctx| draw_scene(ctx, scene, &scene_ids, &matrix, target));
+        let draws = Rc::clone(&draws);
+        pass.record(move |ctx| {
+            let keep = |draw: usize| draws[draw];
+            draw_part(ctx, scene, &scene_ids, &matrix, target, keep)
+        });
     }
     ShadowMap { depth, ids }
 }

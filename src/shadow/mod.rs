@@ -1,5 +1,6 @@
 //! Shadow techniques under one interface.
 
+mod casters;
 pub mod dbuffer;
 pub mod hard;
 mod light_params;
@@ -16,6 +17,7 @@ pub mod ssoc;
 mod technique;
 mod uniform;
 
+pub use casters::{can_block, casters};
 pub use light_params::{LightParams, ViewParams, shape_number};
 pub use light_view::{LightView, LightViews, light_views};
 pub use map::MAP_SIZE;
@@ -26,6 +28,7 @@ use crate::graph::{BufferId, BufferPart, ImageId};
 use crate::light::AreaLight;
 use crate::scene::SceneCamera;
 use glam::DVec3;
+use std::rc::Rc;
 
 /// What a technique is given for one light.
 pub struct ShadowInputs<'f> {
@@ -46,7 +49,9 @@ pub struct ShadowInputs<'f> {
     /// Convex hulls of what the picture can show: all pixels' surfaces lie in one of them. Scene
     /// space, metres.
     pub receivers: Vec<Vec<DVec3>>,
-    /// All triangles, which are also all casters.
+    /// For each of the scene's draws, whether it can block any of the light from any receiver.
+    pub casters: Rc<[bool]>,
+    /// All triangles.
     pub scene: &'f SceneBuffers,
     /// The scene's resources in this graph.
     pub ids: SceneIds,

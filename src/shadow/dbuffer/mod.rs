@@ -34,7 +34,7 @@ use super::receivers::add_receivers;
 use super::shaft_masks::add_shafts;
 use super::silhouettes::{SilhouetteRule, add_silhouettes};
 use super::uniform::add_uniform;
-use super::{LightParams, ShadowInputs, ShadowMask, ViewParams, hard, shape_number};
+use super::{LightParams, ShadowInputs, ShadowMask, ViewParams, casters, hard, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferPart, Graph, ImageId, PassKind, Stage};
 use crate::light::{AreaLight, LightShape, ShapeKind};
@@ -154,6 +154,7 @@ fn lit_by<'f>(
         tile_bounds: inputs.tile_bounds,
         view_params: (buffer, BufferPart { offset: 0, size }),
         receivers: inputs.receivers.clone(),
+        casters: casters(&light, &inputs.receivers, inputs.scene),
         scene: inputs.scene,
         ids: inputs.ids,
     }

@@ -23,17 +23,18 @@
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
 
+mod between;
 mod options;
 mod prefilter;
 mod slices;
 mod views;
 mod visibility;
 
+use between::Casters;
 pub use options::{Combine, Filter, Fit, OcclusionOptions, Planes, Projection};
 
 use super::receivers::add_receivers;
 use super::{ShadowInputs, ShadowMask};
-use crate::geometry::visible_hulls;
 use crate::graph::{Graph, ImageDesc, PassKind};
 use crate::light::ShapeKind;
 use ash::vk;
@@ -56,10 +57,11 @@ pub(super) fn add_passes<'f>(
     options: OcclusionOptions,
 ) -> ShadowMask {
     let boxes: Vec<_> = (inputs.scene.draws().iter().map(|draw| draw.corners)).collect();
-    // Boxes that turn with the triangles grow less around what is turned.
-    let size = inputs.camera.size();
-    let receivers = visible_hulls(&inputs.scene_camera, size, boxes.iter().copied());
-    let views = views::sliced_views(&inputs.light, &receivers, &boxes, &options);
+    let casters = Casters {
+        boxes: &boxes,
+        blocks: &inputs.casters,
+    };
+    let views = views::sliced_views(&inputs.light, &inputs.receivers, &casters, &options);
     let sliced: Vec<_> = views
         .into_iter()
         .enumerate()

@@ -69,6 +69,9 @@ pub enum Fit {
     Occupied,
 }
 
+/// Texels of the slices across a view's largest kernel, unless bounds on the image's size say otherwise.
+const TEXELS_A_KERNEL: f64 = 280.0;
+
 /// Options of `occlusion-textures`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OcclusionOptions {
@@ -314,12 +317,15 @@ impl OcclusionOptions {
         }
     }
 
-    /// Texels across the slices' image for a picture of this size in pixels: several for each pixel's
-    /// footprint where the light looks as the camera does, no more than memory and time are good for.
-    pub(super) fn texels(&self, picture: [u32; 2]) -> u32 {
+    /// Texels across the slices' image for a picture of this size in pixels and a view whose largest
+    /// kernel covers this part of the image: about [`TEXELS_A_KERNEL`] for that, no more than some for
+    /// each pixel, and no more than memory and time are good for. Finer ones measured no better.
+    pub(super) fn texels(&self, picture: [u32; 2], most_kernel: f64) -> u32 {
         let longer = picture[0].max(picture[1]);
-        let fitting = (8 * longer.min(256)).next_power_of_two().clamp(512, 2048);
-        self.resolution.unwrap_or(fitting)
+        let most = (8 * longer.min(256)).next_power_of_two().clamp(512, 2048);
+        let across = TEXELS_A_KERNEL / most_kernel.sqrt().max(1.0e-6);
+        let fitting = across.log2().round().clamp(9.0, 11.0).exp2() as u32;
+        self.resolution.unwrap_or(fitting.min(most))
     }
 
     /// Texels of the bits across one of the filtered textures, for a view whose largest kernel covers

@@ -3,7 +3,7 @@
 use super::options::{Combine, OcclusionOptions};
 use super::views::{OcclusionView, SlicedView};
 use super::{NAME, ShadowInputs};
-use crate::geometry::{SceneBuffers, SceneIds, SceneShaders, draw_scene_with, read_for_draw};
+use crate::geometry::{SceneBuffers, SceneIds, SceneShaders, draw_part_with, read_for_draw};
 use crate::gpu::{
     Blend, ComputePipelineDesc, GpuError, GraphicsPipelineDesc, SamplerDesc, Shader, spirv,
 };
@@ -14,6 +14,7 @@ use crate::graph::{
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Mat4;
+use std::rc::Rc;
 
 /// Slices that one pass marks: four in each of eight attachments.
 const SLICES_A_PASS: u32 = 32;
@@ -75,7 +76,7 @@ pub(super) fn add_slices<'f>(
 ) -> Slices {
     let name = format!("{}.{index}", inputs.light_name);
     let (params, planes) = add_params(graph, &name, view);
-    let side = options.texels(inputs.camera.size());
+    let side = options.texels(inputs.camera.size(), view.most_kernel);
     let fine = options.fine_slices();
     let joined = inputs.scene.features().logic_op;
     let words = if joined { options.words() } else { MOST_WORDS };
@@ -169,10 +170,17 @@ fn add_bits<'f>(
     read_for_draw(&mut pass, inputs.scene, &inputs.ids);
     let bits = pass.color(bits, Load::Clear([0.0; 4]));
     let (scene, ids, push) = (inputs.scene, inputs.ids, drawing.push(0));
+    let casters = Rc::clone(&drawing.view.casters);
     pass.record(move |ctx| {
         let solid = &spirv::OCCLUSION_TEXTURES_SLICES_FRAG;
         let masked = &spirv::OCCLUSION_TEXTURES_SLICES_MASKED_FRAG;
-        draw_slices(ctx, scene, &ids, push, (solid, masked), Blend::Or)
+        draw_slices(
+            ctx,
+            (scene, &ids, &casters),
+            push,
+            (solid, masked),
+            Blend::Or,
+        )
     });
     bits
 }
@@ -199,10 +207,17 @@ fn add_packed_marks<'f>(
         }
         let push = drawing.push(word * SLICES_A_PASS);
         let (scene, ids) = (inputs.scene, inputs.ids);
+        let casters = Rc::clone(&drawing.view.casters);
         pass.record(move |ctx| {
             let solid = &spirv::OCCLUSION_TEXTURES_MARKS_FRAG;
             let masked = &spirv::OCCLUSION_TEXTURES_MARKS_MASKED_FRAG;
-            draw_slices(ctx, scene, &ids, push, (solid, masked), Blend::Max)
+            draw_slices(
+                ctx,
+                (scene, &ids, &casters),
+                push,
+                (solid, masked),
+                Blend::Max,
+            )
         });
 
         let mut pass = graph.pass(format!("{NAME}.pack {name}"), PassKind::Compute);
@@ -233,8 +248,7 @@ fn add_packed_marks<'f>(
 
 fn draw_slices(
     ctx: &mut PassContext<'_>,
-    scene: &SceneBuffers,
-    ids: &SceneIds,
+    (scene, ids, casters): (&SceneBuffers, &SceneIds, &[bool]),
     push: SlicesPush,
     (solid, masked): (&'static Shader, &'static Shader),
     blend: Blend,
@@ -252,7 +266,8 @@ fn draw_slices(
         },
     };
     let matrix = Mat4::from_cols_array_2d(&push.clip_from_scene);
-    draw_scene_with(ctx, scene, ids, &matrix, shaders, |material| {
+    let keep = |index: usize| casters[index];
+    draw_part_with(ctx, scene, ids, &matrix, shaders, keep, |material| {
         let material = material.unwrap_or_default();
         bytemuck::bytes_of(&SlicesPush { material, ..push }).to_vec()
     })

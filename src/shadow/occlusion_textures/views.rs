@@ -1,9 +1,11 @@
 //! Where the scene is cut into slices from: centres of projection, depth ranges, slice planes.
 
+use super::between::{Casters, depths, plane_of};
 use super::options::{OcclusionOptions, Planes, Projection};
 use crate::light::{AreaLight, LightShape};
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat4, DVec3, DVec4, Mat4, Vec3};
+use glam::{DMat4, DVec3, DVec4, Mat4};
+use std::rc::Rc;
 
 /// `OcclusionView` in `occlusion_textures/params.glsl`.
 #[repr(C)]
@@ -33,6 +35,8 @@ pub(super) struct SlicedView {
     pub depth: [f32; 4],
     /// Depths of the planes between fine slices, one more than there are slices.
     pub planes: Vec<f32>,
+    /// Which of the boxes hold what the view shows.
+    pub casters: Rc<[bool]>,
     /// Most texels, of an image of 1 texel, that a kernel can cover: its area as a part of the image.
     pub most_kernel: f64,
 }
@@ -45,11 +49,15 @@ const WIDEST: f64 = 2.14;
 /// into the first slice.
 const NEAREST: f64 = 0.02;
 
+/// Least range of the slices, as a part of what lies between the first plane and the farthest receiver:
+/// thinner ones could not tell a surface from itself.
+const LEAST_RANGE: f64 = 0.02;
+
 /// Texels kept free around what is looked at, as a part of the image.
 const MARGIN: f64 = 2.0 / 512.0;
 
 /// Kernels reach at most this far beyond what receivers project to, as a part of that.
-const MOST_REACH: f64 = 1.0;
+const MOST_REACH: f64 = 0.6;
 
 /// Slope up to which a face of a cube is looked through: a little more than its own 45 degrees, so
 /// that rounding leaves no gap.
@@ -70,15 +78,15 @@ impl Frame {
 }
 
 /// The views of a light; none where it has nothing to look at. `receivers` are hulls of all surfaces
-/// that need its visibility, `casters` corners of boxes around all triangles.
+/// that need its visibility.
 pub(super) fn sliced_views(
     light: &AreaLight,
     receivers: &[Vec<DVec3>],
-    casters: &[[Vec3; 8]],
+    casters: &Casters<'_>,
     options: &OcclusionOptions,
 ) -> Vec<SlicedView> {
     let points: Vec<DVec3> = receivers.iter().flatten().copied().collect();
-    if points.is_empty() || casters.is_empty() {
+    if points.is_empty() {
         return Vec::new();
     }
     let center = light.center.as_dvec3();
@@ -89,7 +97,9 @@ pub(super) fn sliced_views(
         forward: z,
     };
     if light.shape.is_sun() {
-        return vec![sun_view(light, own, &points, casters, options)];
+        return sun_view(light, own, &points, casters, options)
+            .into_iter()
+            .collect();
     }
     let flat = matches!(
         light.shape,
@@ -203,30 +213,37 @@ fn sun_view(
     light: &AreaLight,
     frame: Frame,
     points: &[DVec3],
-    casters: &[[Vec3; 8]],
+    casters: &Casters<'_>,
     options: &OcclusionOptions,
-) -> SlicedView {
+) -> Option<SlicedView> {
     let LightShape::Sun { angular_diameter } = light.shape else {
         unreachable!("only suns come here");
     };
     let tan = f64::from((0.5 * angular_diameter).tan());
     let seen: Vec<DVec3> = points.iter().map(|p| frame.of(*p)).collect();
     let far = seen.iter().map(|v| v.z).fold(f64::NEG_INFINITY, f64::max);
-    let boxes = local_boxes(casters, |p| frame.of(p));
-    let nearest = |limit: ([f64; 2], [f64; 2])| {
-        let within = boxes.iter().filter(|(low, high)| {
-            low.x <= limit.1[0]
-                && high.x >= limit.0[0]
-                && low.y <= limit.1[1]
-                && high.y >= limit.0[1]
-        });
-        within.map(|(low, _)| low.z).fold(f64::INFINITY, f64::min)
-    };
     let (low, high) = bounds(seen.iter().map(|v| [v.x, v.y]));
-    let everywhere = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
-    let margin = tan * (far - nearest(everywhere)).max(0.0);
-    let (low, high) = widened(low, high, margin);
-    let near = nearest((low, high)).min(far);
+    // What the light covers of the plane at a depth, seen from the receivers, and all before those.
+    let mut shaft = vec![plane_of(DVec3::Z, far)];
+    for axis in 0..2 {
+        let across = [DVec3::X, DVec3::Y][axis];
+        shaft.push(plane_of(across + DVec3::Z * tan, high[axis] + tan * far));
+        shaft.push(plane_of(DVec3::Z * tan - across, tan * far - low[axis]));
+    }
+    let (parts, casters) = casters.within(&shaft, |p| frame.of(p));
+    if parts.is_empty() {
+        return None;
+    }
+    let [near, last] = depths(&parts);
+    let margin = tan * (far - near);
+    let (mut low, mut high) = widened(low, high, margin);
+    // Nothing outside of the casters' own extent blocks.
+    let (casters_low, casters_high) = bounds(parts.iter().map(|v| [v.x, v.y]));
+    let (casters_low, casters_high) = widened(casters_low, casters_high, 0.0);
+    for axis in 0..2 {
+        low[axis] = low[axis].max(casters_low[axis]);
+        high[axis] = high[axis].min(casters_high[axis]);
+    }
     let half = [tan as f32, tan as f32, 0.0, 0.0];
     let params = OcclusionView {
         half_x: half,
@@ -240,12 +257,14 @@ fn sun_view(
         low,
         high,
         near,
-        far,
+        far: last,
+        length: far - near,
         local: false,
         kernel,
         slope: f64::INFINITY,
     };
-    finish(params, frame, DVec3::ZERO, &extent, options)
+    let view = finish(params, frame, DVec3::ZERO, &extent, options);
+    Some(SlicedView { casters, ..view })
 }
 
 /// A view from behind a light, of receivers given in its frame.
@@ -253,7 +272,7 @@ fn local_view(
     light: &AreaLight,
     frame: Frame,
     receivers: &[DVec3],
-    casters: &[[Vec3; 8]],
+    casters: &Casters<'_>,
     options: &OcclusionOptions,
     slope: f64,
 ) -> Option<SlicedView> {
@@ -278,24 +297,44 @@ fn local_view(
         }
     };
     let reach = half_x.length().max(half_y.length());
-    let boxes = local_boxes(casters, |p| frame.of(p - center));
-    let in_front = boxes
-        .iter()
-        .filter(|(low, high)| high.z > 0.0 && low.z < far);
-    let nearest = in_front.map(|(low, _)| low.z).fold(far, f64::min);
-    let near = nearest
-        .max(NEAREST * far)
-        .max((0.25 * reach).min(0.25 * far));
+    // What is between the light and the receivers: within the light's reach of the cone around them.
+    let support = |normal: DVec3| match light.shape {
+        LightShape::Rect { .. } => half_x.dot(normal).abs() + half_y.dot(normal).abs(),
+        LightShape::Disk { .. } => half_x.dot(normal).hypot(half_y.dot(normal)),
+        _ => reach * normal.length(),
+    };
+    let least = (NEAREST * far).max((0.25 * reach).min(0.25 * far));
+    let slopes = receivers.iter().filter(|v| v.z > 0.0);
+    let (low, high) = bounds(slopes.map(|v| [v.x / v.z, v.y / v.z]));
+    let mut shaft = vec![plane_of(DVec3::Z, far), plane_of(-DVec3::Z, 0.0)];
+    if receivers.iter().all(|v| v.z > 0.0) {
+        for axis in 0..2 {
+            let across = [DVec3::X, DVec3::Y][axis];
+            for normal in [
+                across - DVec3::Z * high[axis],
+                DVec3::Z * low[axis] - across,
+            ] {
+                shaft.push(plane_of(normal, support(normal)));
+            }
+        }
+    }
+    let (parts, casters) = casters.within(&shaft, |p| frame.of(p - center));
+    if parts.is_empty() {
+        return None;
+    }
+    let [nearest, last] = depths(&parts);
+    let near = nearest.max(least);
+    if last <= 0.0 {
+        return None;
+    }
     let behind = match options.projection {
         Projection::Orthographic => None,
         Projection::Centered => Some(0.0),
         Projection::Offset => {
-            let corners = boxes.iter().flat_map(|(low, high)| {
-                let z = low.z.max(near);
-                let x = low.x.abs().max(high.x.abs());
-                let y = low.y.abs().max(high.y.abs());
-                (high.z > near).then_some([x, y, z])
-            });
+            let corners = parts
+                .iter()
+                .filter(|v| v.z > near)
+                .map(|v| v.abs().to_array());
             let [wide, high] = [
                 half_x.x.abs().max(half_y.x.abs()),
                 half_x.y.abs().max(half_y.y.abs()),
@@ -325,30 +364,13 @@ fn local_view(
     let margin = (reach * (1.0 - near / far) * inverse(near)).min(MOST_REACH * widest);
     let (mut low, mut high) = widened(low, high, margin);
     // Nothing outside of the casters' own extent blocks.
-    let bound = boxes
-        .iter()
-        .filter(|(a, b)| b.z > 0.0 && a.z < far)
-        .map(|(a, b)| {
-            if a.z <= 0.0 && behind.is_some() {
-                return ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
-            }
-            let z = [a.z, b.z];
-            let all = (0..8).map(|i| {
-                project(DVec3::new(
-                    if i & 1 == 0 { a.x } else { b.x },
-                    if i & 2 == 0 { a.y } else { b.y },
-                    z[i >> 2],
-                ))
-            });
-            bounds(all)
-        });
-    let casters = bound.reduce(|(a, b), (c, d)| {
-        (
-            [a[0].min(c[0]), a[1].min(c[1])],
-            [b[0].max(d[0]), b[1].max(d[1])],
-        )
-    })?;
-    let (casters_low, casters_high) = widened(casters.0, casters.1, 0.0);
+    let at_light = parts.iter().any(|v| v.z <= 1.0e-6 * far);
+    let (casters_low, casters_high) = if at_light && behind.is_some() {
+        ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2])
+    } else {
+        bounds(parts.iter().map(|v| project(*v)))
+    };
+    let (casters_low, casters_high) = widened(casters_low, casters_high, 0.0);
     // Kernels may reach out of the image where it ends before the casters do: what is there is taken
     // to be as what is inside.
     let mut border = [0.0, 0.0, 1.0, 1.0];
@@ -380,12 +402,14 @@ fn local_view(
         low,
         high,
         near,
-        far,
+        far: last,
+        length: far - near,
         local: true,
         kernel,
         slope,
     };
-    Some(finish(params, frame, center, &extent, options))
+    let view = finish(params, frame, center, &extent, options);
+    Some(SlicedView { casters, ..view })
 }
 
 /// Distance of the centre of projection behind a light of these half extents, so that the frustum
@@ -408,20 +432,6 @@ fn offset_of(
     let narrow = points.map(|[x, y, z]| x.max(y) / WIDEST - z);
     let least = narrow.fold(0.0, f64::max).min(far);
     (fit < 1.0e3 * far).then_some(fit.max(least))
-}
-
-fn local_boxes(casters: &[[Vec3; 8]], of: impl Fn(DVec3) -> DVec3) -> Vec<(DVec3, DVec3)> {
-    let solid = casters
-        .iter()
-        .filter(|corners| corners.iter().all(|corner| corner.is_finite()));
-    solid
-        .map(|corners| {
-            let corners = corners.map(|corner| of(corner.as_dvec3()));
-            let low = corners.iter().fold(DVec3::INFINITY, |a, c| a.min(*c));
-            let high = corners.iter().fold(DVec3::NEG_INFINITY, |a, c| a.max(*c));
-            (low, high)
-        })
-        .collect()
 }
 
 fn bounds(points: impl Iterator<Item = [f64; 2]>) -> ([f64; 2], [f64; 2]) {
@@ -457,6 +467,8 @@ struct Extent {
     /// Slice planes, metres.
     near: f64,
     far: f64,
+    /// From the nearest plane to the farthest receiver, metres.
+    length: f64,
     /// Whether penumbrae narrow evenly in 1 / depth, not in depth.
     local: bool,
     /// Largest kernel, in image coordinates squared.
@@ -480,7 +492,7 @@ fn finish(
         ..
     } = *extent;
     let width = (extent.far - near)
-        .max(1.0e-6 * extent.far.abs())
+        .max(LEAST_RANGE * extent.length)
         .max(1.0e-6);
     let far = near + width * (1.0 + 1.0e-4);
     let by_inverse = match options.planes {
@@ -524,6 +536,7 @@ fn finish(
         clip_from_scene: rows.transpose().as_mat4(),
         depth: z.as_vec4().to_array(),
         planes: planes.collect(),
+        casters: [].into(),
         most_kernel: (extent.kernel * scale[0] * scale[1]).min(1.0),
     }
 }

@@ -33,7 +33,7 @@ mod visibility;
 pub use options::{Find, MOST_SEGMENTS, OessOptions, Outreach};
 
 use super::light_view::LightView;
-use super::map::add_maps_of_size;
+use super::map::add_maps_of;
 use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, hard};
 use crate::geometry::DrawTarget;
@@ -102,13 +102,15 @@ pub(super) fn add_passes<'f>(
         format!("{NAME}.params {}", inputs.light_name),
         params,
     );
-    let maps = add_maps_of_size(
+    // What lies behind a blocker decides which edges count, and that may be ground that blocks nothing.
+    let draws = vec![true; inputs.scene.draws().len()].into();
+    let maps = add_maps_of(
         graph,
         inputs,
         NAME,
         &views.views,
         DrawTarget::Ids,
-        options.resolution,
+        (options.resolution, draws),
     );
     let line = visibility::Line {
         options,

@@ -1,6 +1,7 @@
 use super::*;
 use crate::scene::Aabb;
-use glam::Vec4;
+use crate::shadow::can_block;
+use glam::{Vec3, Vec4};
 
 fn light(shape: LightShape) -> AreaLight {
     AreaLight::new(shape, Vec3::new(1.0, 10.0, 2.0), Vec3::NEG_Y, Vec3::X)
@@ -22,7 +23,13 @@ fn views_of(shape: LightShape, boxes: &[Aabb], options: &OcclusionOptions) -> Ve
         .iter()
         .map(|b| b.corners().map(|c| c.as_dvec3()).to_vec())
         .collect();
-    sliced_views(&light(shape), &hulls, &corners(boxes), options)
+    let boxes = corners(boxes);
+    let blocks = can_block(&light(shape), &hulls, &boxes);
+    let casters = Casters {
+        boxes: &boxes,
+        blocks: &blocks,
+    };
+    sliced_views(&light(shape), &hulls, &casters, options)
 }
 
 const RECT: LightShape = LightShape::Rect {

@@ -1,0 +1,142 @@
+//! Which parts of the scene can stand between a light and what the picture shows.
+
+use crate::geometry::SceneBuffers;
+use crate::light::{AreaLight, LightShape};
+use glam::{DVec3, Vec3};
+use std::rc::Rc;
+
+/// Rounding of coordinates that are held in 32 bits, as a part of them, with what boxes around
+/// triangles add to it.
+const ROUNDING: f64 = 4.0e-6;
+
+/// [`can_block`] for each of a scene's draws.
+pub fn casters(light: &AreaLight, receivers: &[Vec<DVec3>], scene: &SceneBuffers) -> Rc<[bool]> {
+    let boxes: Vec<_> = scene.draws().iter().map(|draw| draw.corners).collect();
+    can_block(light, receivers, &boxes).into()
+}
+
+/// For each box (eight corners in scene space, metres, x changing fastest, then y) whether what is in it can block any part
+/// of the light from any point of the receivers' convex hulls. It cannot where the light and all
+/// receivers lie on the outer side of a face of the box: neither does flat ground shadow itself or
+/// what stands on it, nor a wall the room that it closes.
+///
+/// Never wrong about what it rules out; what it leaves may still block nothing.
+pub fn can_block(light: &AreaLight, receivers: &[Vec<DVec3>], boxes: &[[Vec3; 8]]) -> Vec<bool> {
+    let largest = |corners: &[Vec3; 8]| {
+        corners
+            .iter()
+            .map(|c| c.abs().max_element())
+            .fold(0.0, f32::max)
+    };
+    let finite = boxes.iter().map(largest).filter(|size| size.is_finite());
+    let slack = ROUNDING * f64::from(finite.fold(0.0, f32::max));
+    boxes
+        .iter()
+        .map(|corners| {
+            let corners = corners.map(|corner| corner.as_dvec3());
+            !outer_faces(&corners).into_iter().any(|(normal, offset)| {
+                light_is_beyond(light, normal, offset - slack)
+                    && receivers
+                        .iter()
+                        .flatten()
+                        .all(|p| normal.dot(*p) >= offset - slack)
+            })
+        })
+        .collect()
+}
+
+/// Outward normals of a box's faces, and the offsets of their planes; of a flat box, both sides.
+fn outer_faces(corners: &[DVec3; 8]) -> Vec<(DVec3, f64)> {
+    let edges = [1, 2, 4].map(|i| corners[i] - corners[0]);
+    let mut faces = Vec::with_capacity(6);
+    for axis in 0..3 {
+        let across = edges[(axis + 1) % 3].cross(edges[(axis + 2) % 3]);
+        let Some(normal) = across.try_normalize() else {
+            continue;
+        };
+        for normal in [normal, -normal] {
+            let offset = corners
+                .iter()
+                .map(|c| normal.dot(*c))
+                .fold(f64::NEG_INFINITY, f64::max);
+            faces.push((normal, offset));
+        }
+    }
+    faces
+}
+
+/// Whether all of a light lies where `normal` . p >= `offset`; of a sun, whether its directions do
+/// not lead back from there.
+fn light_is_beyond(light: &AreaLight, normal: DVec3, offset: f64) -> bool {
+    let [x, y] = [light.axis_x, light.axis_y].map(|axis| normal.dot(axis.as_dvec3()));
+    let reach = match light.shape {
+        LightShape::Sun { angular_diameter } => {
+            let towards = -light.direction.as_dvec3();
+            return normal.dot(towards) >= (0.5 * f64::from(angular_diameter)).sin();
+        }
+        LightShape::Rect { width, height } => {
+            0.5 * (f64::from(width) * x.abs() + f64::from(height) * y.abs())
+        }
+        LightShape::Disk { radius } => f64::from(radius) * x.hypot(y),
+        _ => f64::from(light.shape.bounding_radius()),
+    };
+    normal.dot(light.center.as_dvec3()) - reach >= offset
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Aabb;
+
+    fn boxed(low: [f32; 3], high: [f32; 3]) -> [Vec3; 8] {
+        let (min, max) = (low.into(), high.into());
+        Aabb { min, max }.corners()
+    }
+
+    fn hull(corners: &[Vec3; 8]) -> Vec<DVec3> {
+        corners.iter().map(|c| c.as_dvec3()).collect()
+    }
+
+    fn light(shape: LightShape, center: [f32; 3]) -> AreaLight {
+        AreaLight::new(shape, center.into(), Vec3::NEG_Y, Vec3::X)
+    }
+
+    #[test]
+    fn flat_ground_blocks_nothing_above_it() {
+        let ground = boxed([-10.0, 1.0, -10.0], [10.0, 1.0, 10.0]);
+        let body = boxed([-1.0, 1.0, -1.0], [1.0, 2.0, 1.0]);
+        let receivers = [hull(&ground), hull(&body)];
+        let sun = LightShape::Sun {
+            angular_diameter: 0.5,
+        };
+        for shape in [
+            LightShape::Disk { radius: 2.0 },
+            LightShape::Sphere { radius: 2.0 },
+            sun,
+        ] {
+            let light = light(shape, [0.0, 4.0, 0.0]);
+            assert_eq!(
+                can_block(&light, &receivers, &[ground, body]),
+                [false, true]
+            );
+        }
+        // A light that reaches below it, and something below it, are both reasons.
+        let low = light(LightShape::Sphere { radius: 4.0 }, [0.0, 4.0, 0.0]);
+        assert_eq!(can_block(&low, &receivers, &[ground]), [true]);
+        let cellar = boxed([0.0, 0.0, 0.0], [0.1, 0.5, 0.1]);
+        let disk = light(LightShape::Disk { radius: 2.0 }, [0.0, 4.0, 0.0]);
+        let with_cellar = [hull(&ground), hull(&cellar)];
+        assert_eq!(can_block(&disk, &with_cellar, &[ground]), [true]);
+    }
+
+    #[test]
+    fn walls_do_not_shadow_their_room() {
+        let wall = boxed([5.0, 0.0, -5.0], [5.0, 3.0, 5.0]);
+        let screen = boxed([2.0, 0.0, -1.0], [2.0, 2.0, 1.0]);
+        let thick = boxed([5.0, 0.0, -5.0], [5.5, 3.0, 5.0]);
+        let receivers = [hull(&wall), hull(&screen)];
+        let lamp = light(LightShape::Sphere { radius: 0.5 }, [0.0, 2.0, 0.0]);
+        let boxes = [wall, screen, thick];
+        assert_eq!(can_block(&lamp, &receivers, &boxes), [false, true, false]);
+    }
+}

@@ -7,6 +7,7 @@ mod above;
 mod irradiance;
 mod overrides;
 mod profile;
+mod weights;
 
 use std::f32::consts::PI;
 use std::fmt;
@@ -16,6 +17,7 @@ use glam::Vec3;
 
 pub use overrides::{LightOverrides, LightScale, LightSize, SunAngle};
 pub use profile::{LightProfile, MAX_PROFILE};
+pub use weights::{LightWeights, MAX_WEIGHTS};
 
 /// Angular diameter of a sun for which the file states none, in radians (0.53 degrees).
 pub const DEFAULT_SUN_ANGLE: f32 = 0.009_250_245;
@@ -306,6 +308,9 @@ pub struct AreaLight {
     /// How brightness goes along a line; other shapes are even. Visibility counts each part of a line by
     /// it.
     pub profile: LightProfile,
+    /// How brightness goes over a rectangle; other shapes are even. Visibility counts each part of a
+    /// rectangle by it.
+    pub weights: LightWeights,
 }
 
 impl AreaLight {
@@ -341,6 +346,16 @@ impl AreaLight {
             range: None,
             spot: None,
             profile: LightProfile::EVEN,
+            weights: LightWeights::EVEN,
+        }
+    }
+
+    /// True if not all parts of its shape are equally bright.
+    pub fn is_uneven(&self) -> bool {
+        match self.shape {
+            LightShape::Line { .. } => !self.profile.is_even(),
+            LightShape::Rect { .. } => !self.weights.is_even(),
+            _ => false,
         }
     }
 
@@ -505,6 +520,12 @@ pub enum LightError {
     /// A profile for a light that is no line.
     #[error("--light-profile needs a line, and this light is a {kind}")]
     ProfileShape {
+        /// The light's shape.
+        kind: ShapeKind,
+    },
+    /// Weights for a light that is no rectangle.
+    #[error("--light-weights needs a rect, and this light is a {kind}")]
+    WeightsShape {
         /// The light's shape.
         kind: ShapeKind,
     },

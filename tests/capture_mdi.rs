@@ -3,7 +3,7 @@
 mod support;
 
 use antumbra::capture::{FrameRenderer, FrameRequest};
-use antumbra::light::LightShape;
+use antumbra::light::{LightProfile, LightShape, LightWeights};
 use antumbra::scene::{Primitive, Scene, SceneCamera};
 use glam::Vec3;
 use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, quad, scene};
@@ -87,6 +87,7 @@ fn closed_forms() {
     c6_frames_repeat_to_the_bit(&mut rig);
     lists_without_room_leave_the_masks(&mut rig);
     random_rays_are_right_on_average(&mut rig);
+    uneven_lights_are_weighed(&mut rig);
     pixels_can_be_antialiased(&mut rig);
     times_of_passes_account_for_the_frame(&mut rig);
     support::assert_no_messages(&rig.0.destroy().unwrap());
@@ -269,6 +270,95 @@ fn random_rays_are_right_on_average(rig: &mut Rig) {
         square / variance
     );
     assert!(mean.abs() < 0.005 && (0.9..1.1).contains(&(square / variance)));
+}
+
+/// Several small lights in one filter, and a line as a row of weights, against the sum over their parts.
+fn uneven_lights_are_weighed(rig: &mut Rig) {
+    const CELLS: usize = 3;
+    let values = [2.0, 0.0, 1.0, 0.0, 0.5, 0.0, 4.0, 0.0, 0.0];
+    let plates = || {
+        vec![
+            floor(),
+            plate("near", [-30.0, 0.0], WIDE, 3.0),
+            plate("far", WIDE, [-30.0, 0.0], 6.0),
+        ]
+    };
+    // The part of a cell, counted from the least x or z, that a half-plane through 0 leaves free.
+    let part = |cell: usize, at: f32, depth: f32| {
+        let first = -at * depth / HEIGHT / (1.0 - depth / HEIGHT);
+        let begin = -1.0 + 2.0 / CELLS as f32 * cell as f32;
+        (1.0 - (first - begin) * 0.5 * CELLS as f32).clamp(0.0, 1.0)
+    };
+    // The light's +y is -z here: the first row has the least z.
+    let sum: f32 = values.iter().sum();
+    let truth = |x: f32, z: f32| {
+        let cells = values.iter().enumerate();
+        let seen = cells.map(|(i, v)| v * part(i % CELLS, x, 3.0) * part(i / CELLS, z, 6.0));
+        seen.sum::<f32>() / sum
+    };
+    let mut both = scene(plates(), square(1.0));
+    both.lights[0].light.weights = LightWeights::new(CELLS, &values).unwrap();
+    let techniques = [
+        "mdi:rays=256,buckets=128",
+        "mdi:rays=64",
+        "mdi:rays=256,pattern=random",
+    ];
+    let images = rig.render(&both, (&camera(), SIZE), &techniques);
+    // A bucket's share of the error, as of `c1`, and a cell's few rays.
+    for (image, most) in images.iter().zip([0.01, 0.02, 0.03]) {
+        let squares = image.iter().enumerate().map(|(i, v)| {
+            let [x, z] = [i as u32 % SIZE, i as u32 / SIZE].map(floor_x);
+            f64::from(v - truth(x, z)).powi(2)
+        });
+        let rms = (squares.sum::<f64>() / f64::from(SIZE * SIZE)).sqrt();
+        println!("weights: rms {rms}");
+        assert!(rms <= most, "{rms}");
+    }
+    #[cfg(feature = "cli")]
+    weights_are_those_of_the_truth(&both);
+
+    // A line along x whose brightness rises from 0: half of the light is in its last 0.29 parts.
+    let mut line = scene(plates(), LightShape::Line { length: 2.0 });
+    line.lights[0].light.profile = LightProfile::new(&[0.0, 1.0]).unwrap();
+    let image = &rig.render(&line, (&camera(), SIZE), &["mdi:rays=256,buckets=128"])[0];
+    let [darker, lighter] = errors(image, |x, z| {
+        let first = 0.5 - 0.5 * (x * 0.3 / 0.7).clamp(-1.0, 1.0);
+        if z > 0.0 { 1.0 - first * first } else { 0.0 }
+    });
+    println!("profile: {darker} {lighter}");
+    assert!(-darker <= 0.02 && lighter <= 0.02, "{darker} {lighter}");
+}
+
+/// The ray-traced truth weighs alike: the picture's mean is its, in each quarter.
+#[cfg(feature = "cli")]
+fn weights_are_those_of_the_truth(scene: &Scene) {
+    use antumbra::reference::{Reference, Sampling, Settings};
+    let reference = Reference::new(scene).unwrap();
+    let settings = Settings {
+        camera: &camera(),
+        size: [16; 2],
+        light: &scene.lights[0].light,
+        sampling: &Sampling::Plain { samples: 1024 },
+    };
+    let truth = reference.render(&settings, &|_| ()).unwrap().visibility;
+    let values = scene.lights[0].light.weights.values();
+    let sum: f32 = values.iter().sum();
+    for (i, v) in truth.iter().enumerate() {
+        let [x, z] = [i % 16, i / 16].map(|i| 1.6 * ((i as f32 + 0.5) / 8.0 - 1.0));
+        let free = |cell: usize, at: f32, depth: f32| {
+            let first = -at * depth / HEIGHT / (1.0 - depth / HEIGHT);
+            (1.0 - (first + 1.0 - 2.0 / 3.0 * cell as f32) * 1.5).clamp(0.0, 1.0)
+        };
+        let cells = values.iter().enumerate();
+        let seen: f32 = cells
+            .map(|(i, v)| v * free(i % 3, x, 3.0) * free(i / 3, z, 6.0))
+            .sum();
+        assert!(
+            (v - seen / sum).abs() < 0.01,
+            "{v} for {} at {i}",
+            seen / sum
+        );
+    }
 }
 
 /// Under a light of hardly any size a pixel is as bright as the part of it that is lit.

@@ -10,7 +10,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::PathBuf;
 
-use antumbra::capture::exr;
+use antumbra::capture::{exr, png};
 use program::{COURT, Result, SPHERE, antumbra, capture, capture_command, changed_scene};
 use program::{assert_fails, names, node, run};
 use serde_json::{Value, json};
@@ -257,6 +257,49 @@ fn lights_are_chosen_by_name_index_and_placeholder() -> Result {
     assert_eq!(text.matches("rect, 2 x 0.5 m").count(), 2, "{text}");
     let text = go(&["--light", "0", "--light-scale", "3"], "v.exr")?;
     assert!(text.contains("disk, radius 1.5 m"), "{text}");
+    Ok(())
+}
+
+#[test]
+fn an_image_says_how_bright_a_rect_is() -> Result {
+    let folder = tempfile::tempdir()?;
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let grey = |values: &[f32]| png::encode_grey16(3, 1, values);
+    fs::write(path("left.png"), grey(&[1.0, 0.0, 0.0])?)?;
+    fs::write(path("black.png"), grey(&[0.0; 3])?)?;
+    fs::write(path("text.png"), "no image")?;
+    let go = |shape: &[&str], weights: &str, technique: &str| {
+        let mut all: Vec<String> = ["capture", SPHERE, "--size", "32x32", "--visibility"]
+            .map(String::from)
+            .to_vec();
+        all.push(path("v.exr"));
+        all.extend(shape.iter().map(|word| word.to_string()));
+        all.extend(["--light-weights".to_string(), path(weights)]);
+        all.extend(["--technique".to_string(), technique.to_string()]);
+        run(all)
+    };
+    let rect = ["--light-shape", "rect", "--light-size", "2x0.5"];
+    let done = go(&rect, "left.png", "mdi")?;
+    assert!(done.status.success(), "{done:?}");
+    for (shape, weights, technique, wanted) in [
+        (&rect[..], "none.png", "mdi", "none.png: "),
+        (&rect, "text.png", "mdi", "text.png: "),
+        (&rect, "black.png", "mdi", "black.png: it is black"),
+        (
+            &rect,
+            "left.png",
+            "pcss",
+            "cannot do light weights; `mdi` does",
+        ),
+        (
+            &rect[..0],
+            "left.png",
+            "mdi",
+            "--light-weights needs a rect",
+        ),
+    ] {
+        assert_fails(&go(shape, weights, technique)?, 2, &[wanted]);
+    }
     Ok(())
 }
 

@@ -134,8 +134,10 @@ vec3 ray_of(Fan fan, uint i) {
         bits ^= bits >> 16;
         vec2 part = vec2(bits >> 8) / 16777216.0;
         float angle = 6.2831853 * part.y;
+        bool uneven = (params.options.w & UNEVEN_LIGHT) != 0u;
         bool round = LIGHT_SHAPE != LIGHT_RECT && LIGHT_SHAPE != LIGHT_LINE;
         ray.xy = round ? sqrt(part.x) * vec2(cos(angle), sin(angle)) : 2.0 * part - 1.0;
+        ray.xy = uneven ? rays[bits.x % MAX_RAYS].xy : ray.xy;
     }
     return ray;
 }
@@ -383,7 +385,7 @@ Fan fan_in(uint index, vec3 q, vec3 n, PlacedLight placed) {
         in_view(light_view, placed.axis_y));
 }
 
-// The part of the light that is seen, of that above the receiver's plane.
+// The part of the light that is seen, of that above the receiver's plane; of an uneven light, of all.
 float traced(Fan fan, vec3 q, vec3 n, PlacedLight placed) {
     uvec4 clear;
     uvec4 marks = reached(fan, clear);
@@ -399,7 +401,8 @@ float traced(Fan fan, vec3 q, vec3 n, PlacedLight placed) {
         others |= any_mark ? 1u << i : 0u;
         nearest = any_mark ? max(nearest, place > 0.0 ? s : 1.0e30) : nearest;
     }
-    if (marks == uvec4(0u) && others == 0u) {
+    bool uneven = (params.options.w & UNEVEN_LIGHT) != 0u;
+    if (marks == uvec4(0u) && others == 0u && !uneven) {
         return 1.0;
     }
     float seen = 0.0;
@@ -450,6 +453,7 @@ float traced(Fan fan, vec3 q, vec3 n, PlacedLight placed) {
             seen += (open >> (i - first) & 1u) != 0u ? rays[i].z : 0.0;
         }
     }
+    above = uneven ? 1.0 : above;
     return above > 0.0 ? min(seen / above, 1.0) : 1.0;
 }
 
@@ -515,7 +519,8 @@ float pixel_visibility(uvec2 pixel) {
                 texels *= LIGHT_SHAPE == LIGHT_SUN ? 1.0 : fan.s;
                 fan.spread = mat2(spread[0] * texels, spread[1] * texels);
             }
-            result = above * traced(fan, q, n, placed);
+            bool uneven = (params.options.w & UNEVEN_LIGHT) != 0u;
+            result = (uneven ? 1.0 : above) * traced(fan, q, n, placed);
         }
     }
     return result;

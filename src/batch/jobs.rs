@@ -167,6 +167,7 @@ impl LightTable {
             scale: self.scale.map(LightScale),
             sun_angle: self.sun_angle.map(SunAngle),
             profile: self.profile.as_ref().map(|profile| profile.value),
+            weights: None,
         }
     }
 

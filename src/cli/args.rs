@@ -9,7 +9,9 @@ use clap::Args;
 use super::error::CliError;
 use crate::batch::Sequence;
 use crate::capture::FrameRequest;
-use crate::light::{LightOverrides, LightProfile, LightScale, LightSize, ShapeKind, SunAngle};
+use crate::light::{
+    LightOverrides, LightProfile, LightScale, LightSize, LightWeights, ShapeKind, SunAngle,
+};
 use crate::scene::{LoadOptions, Scene, SceneCamera, SceneFile, SceneLight};
 use crate::shadow::Technique;
 
@@ -113,6 +115,15 @@ struct OverrideArgs {
     /// between, such as 0.2,1
     #[arg(long, value_name = "A,B,..", allow_hyphen_values = true, help_heading = LIGHT_HEADING)]
     light_profile: Option<LightProfile>,
+
+    /// Brightness over a rect: a PNG or JPEG, its left side at -x and its top at +y, of grey values as they
+    /// are; means over 16x16 parts where it is larger
+    #[arg(long, value_name = "FILE", value_parser = weights_in, help_heading = LIGHT_HEADING)]
+    light_weights: Option<Box<LightWeights>>,
+}
+
+fn weights_in(path: &str) -> Result<Box<LightWeights>, String> {
+    LightWeights::read(std::path::Path::new(path)).map(Box::new)
 }
 
 /// A scene with the command line's changes, and the frame of it that was asked for.
@@ -154,6 +165,7 @@ impl ViewArgs {
                 light_scale: overrides.scale,
                 sun_angle: overrides.sun_angle,
                 light_profile: overrides.profile,
+                light_weights: overrides.weights.map(Box::new),
             },
         }
     }
@@ -210,6 +222,7 @@ impl ViewArgs {
             scale: self.overrides.light_scale,
             sun_angle: self.overrides.sun_angle,
             profile: self.overrides.light_profile,
+            weights: self.overrides.light_weights.as_deref().copied(),
         };
         scene
             .override_lights(&overrides, selected)

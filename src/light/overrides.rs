@@ -4,7 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{
-    AreaLight, IntensityUnit, LightError, LightProfile, LightShape, ShapeKind, check_length,
+    AreaLight, IntensityUnit, LightError, LightProfile, LightShape, LightWeights, ShapeKind,
+    check_length,
 };
 
 /// `--light-size`: `R` for a disk's or sphere's radius, `L` for a line's length, `WxH` for a
@@ -100,6 +101,8 @@ pub struct LightOverrides {
     pub sun_angle: Option<SunAngle>,
     /// Replaces the profile of lines.
     pub profile: Option<LightProfile>,
+    /// Replaces the weights of rectangles.
+    pub weights: Option<LightWeights>,
 }
 
 impl LightOverrides {
@@ -116,6 +119,7 @@ impl LightOverrides {
                 shape: None,
                 size: None,
                 profile: None,
+                weights: None,
                 ..*self
             }
         } else {
@@ -141,6 +145,12 @@ impl LightOverrides {
                 return Err(LightError::ProfileShape { kind: shape.kind() });
             }
             changed.profile = profile;
+        }
+        if let Some(weights) = self.weights {
+            if shape.kind() != ShapeKind::Rect {
+                return Err(LightError::WeightsShape { kind: shape.kind() });
+            }
+            changed.weights = weights;
         }
         if shape.kind() != light.shape.kind() && light.unit == IntensityUnit::Nits {
             changed.intensity = light.candela();

@@ -188,6 +188,14 @@ impl Hash {
         };
         self.numbers([kind]);
         self.floats(sizes);
+        if light.is_uneven() {
+            let is_line = kind == 4;
+            let (profile, weights) = (light.profile.values(), light.weights.values());
+            let columns = if is_line { 1 } else { light.weights.columns() };
+            let values = if is_line { profile } else { weights };
+            self.numbers([columns as u64, values.len() as u64]);
+            self.floats(values.iter().copied());
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 use glam::{DVec2, DVec3};
 
 use super::triangles::End;
-use crate::light::{AreaLight, LightProfile, LightShape};
+use crate::light::{AreaLight, LightShape};
 
 /// A scrambled Sobol' sequence in two dimensions.
 ///
@@ -82,7 +82,7 @@ fn disk_from_square(p: DVec2) -> DVec2 {
 
 /// A light as one receiver sees it: what turns coordinates on the light into ends of segments.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LightFrom {
+pub(super) struct LightFrom<'a> {
     kind: Kind,
     /// From the receiver to the middle of the light; for a sun a unit vector.
     center: DVec3,
@@ -91,8 +91,8 @@ pub(super) struct LightFrom {
     half_y: DVec3,
     /// How exactly its points are known, metres.
     error: f64,
-    /// Of a line.
-    profile: LightProfile,
+    /// How bright its parts are.
+    light: &'a AreaLight,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,8 +107,8 @@ enum Kind {
     Sun(f64),
 }
 
-impl LightFrom {
-    pub(super) fn new(light: &AreaLight, receiver: DVec3) -> Self {
+impl<'a> LightFrom<'a> {
+    pub(super) fn new(light: &'a AreaLight, receiver: DVec3) -> Self {
         let [x, y] = [light.axis_x, light.axis_y].map(|axis| axis.as_dvec3().normalize());
         let center = light.center.as_dvec3() - receiver;
         // The light's frame is rounded to f32, so that its points are no better than that.
@@ -120,7 +120,7 @@ impl LightFrom {
             half_x: x,
             half_y: y,
             error,
-            profile: light.profile,
+            light,
         };
         match light.shape {
             LightShape::Point => planar(Kind::Point, DVec3::ZERO, DVec3::ZERO),
@@ -160,7 +160,7 @@ impl LightFrom {
                     half_x: x,
                     half_y: y,
                     error: 0.0,
-                    profile: light.profile,
+                    light,
                 }
             }
         }
@@ -198,15 +198,19 @@ impl LightFrom {
         ])
     }
 
-    /// The point of the light for a point of the unit square, equal areas to equal areas; on a line to
-    /// equal parts of its light.
+    /// The point of the light for a point of the unit square, equal areas to equal areas; on a line
+    /// or rectangle to equal parts of its light.
     pub(super) fn spread(&self, p: DVec2) -> End {
         let p = 2.0 * p - 1.0;
         match self.kind {
             Kind::Disk | Kind::Sun(_) => self.at(disk_from_square(p)),
             Kind::Line => {
-                let place = self.profile.place_of(0.5 * (p.x + 1.0));
+                let place = self.light.profile.place_of(0.5 * (p.x + 1.0));
                 self.at(DVec2::new(2.0 * place - 1.0, 0.0))
+            }
+            Kind::Rect if self.light.is_uneven() => {
+                let place = self.light.weights.place_of((0.5 * (p + 1.0)).to_array());
+                self.at(2.0 * DVec2::from_array(place) - 1.0)
             }
             _ => self.at(p),
         }

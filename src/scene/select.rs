@@ -115,6 +115,8 @@ impl Scene {
             "--light-size"
         } else if overrides.profile.is_some() && !any_other {
             "--light-profile"
+        } else if overrides.weights.is_some() && !any_other {
+            "--light-weights"
         } else {
             return Ok(());
         };

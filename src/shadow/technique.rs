@@ -102,9 +102,15 @@ pub enum TechniqueError {
     },
     /// The technique takes all parts of a line for equally bright.
     #[error(
-        "technique `{technique}` cannot do a light profile; `oess` does, and `hard` needs none"
+        "technique `{technique}` cannot do a light profile; `oess` and `mdi` do, and `hard` needs none"
     )]
     Profile {
+        /// The technique.
+        technique: &'static str,
+    },
+    /// The technique takes all parts of a rectangle for equally bright.
+    #[error("technique `{technique}` cannot do light weights; `mdi` does, and `hard` needs none")]
+    Weights {
         /// The technique.
         technique: &'static str,
     },
@@ -341,21 +347,24 @@ impl Technique {
     /// Refuses a light that the technique cannot do.
     ///
     /// # Errors
-    /// [`TechniqueError::Shape`], which names the shapes that it can do, or
-    /// [`TechniqueError::Profile`].
+    /// [`TechniqueError::Shape`], which names the shapes that it can do,
+    /// [`TechniqueError::Profile`] or [`TechniqueError::Weights`].
     pub fn check(self, light: &AreaLight) -> Result<(), TechniqueError> {
         let shape = light.shape.kind();
-        let uneven = shape == ShapeKind::Line && !light.profile.is_even();
-        if uneven && !matches!(self, Self::Hard | Self::Oess(_)) {
-            let technique = self.name();
-            return Err(TechniqueError::Profile { technique });
+        let technique = self.name();
+        if light.is_uneven() && !matches!(self, Self::Hard | Self::Mdi(_)) {
+            match shape {
+                ShapeKind::Line if matches!(self, Self::Oess(_)) => (),
+                ShapeKind::Line => return Err(TechniqueError::Profile { technique }),
+                _ => return Err(TechniqueError::Weights { technique }),
+            }
         }
         if self.shapes().contains(&shape) {
             return Ok(());
         }
         let names: Vec<&str> = self.shapes().iter().map(|shape| shape.name()).collect();
         Err(TechniqueError::Shape {
-            technique: self.name(),
+            technique,
             shape,
             known: names.join(", "),
         })

@@ -183,14 +183,29 @@ pub fn bush() -> Document {
     b
 }
 
-/// Under four small lights, at the corners of a large one.
+/// Under four small lights, at the corners of a large one: one light with weights, dark but there.
 pub fn corners() -> Document {
     let mut b = garden();
-    for (i, [x, z]) in [[-1.6, 0.6], [0.0, 0.6], [-1.6, 2.2], [0.0, 2.2]]
-        .into_iter()
-        .enumerate()
-    {
-        square(&mut b, &format!("corner {i}"), 0.15, 20.0, [x, 4.2, z]);
-    }
+    const SIDE: f64 = 1.8;
+    const ROWS: [&str; 12] = [
+        "[1,0,0,0,0,0,0,0,0,0,0,1]",
+        DARK,
+        DARK,
+        DARK,
+        DARK,
+        DARK,
+        DARK,
+        DARK,
+        DARK,
+        DARK,
+        DARK,
+        "[1,0,0,0,0,0,0,0,0,0,0,1]",
+    ];
+    const DARK: &str = "[0,0,0,0,0,0,0,0,0,0,0,0]";
+    let json = format!(
+        r#""type":"point","color":[1,0.96,0.90],"intensity":80,"extras":{{"shape":"rect","width":{SIDE},"height":{SIDE},"weights":[{}]}}"#,
+        ROWS.join(",")
+    );
+    b.light("corners", &json, [-0.8, 4.2, 1.4], [0.0; 3]);
     b
 }

@@ -8,7 +8,9 @@ use serde_json::{Map, Value};
 use super::document::{AreaLightJson, Side};
 use super::nodes::{self, Keep, PlacedNode};
 use super::{Scene, SceneError, Source, element, shorten};
-use crate::light::{AreaLight, DEFAULT_SUN_ANGLE, IntensityUnit, LightShape, SpotCone};
+use crate::light::{
+    AreaLight, DEFAULT_SUN_ANGLE, IntensityUnit, LightShape, LightWeights, SpotCone,
+};
 use crate::scene::SceneLight;
 
 /// What a light is apart from where it is.
@@ -20,6 +22,7 @@ struct Emitter {
     unit: IntensityUnit,
     range: Option<f32>,
     spot: Option<SpotCone>,
+    weights: LightWeights,
 }
 
 /// Adds the lights of all nodes, in document order.
@@ -71,6 +74,7 @@ pub(super) fn add(
             unit: emitter.unit,
             range: emitter.range,
             spot: emitter.spot,
+            weights: emitter.weights,
             ..AreaLight::new(emitter.shape, center, direction, frame.x_axis.as_vec3())
         };
         light.validate().map_err(|error| SceneError::Light {
@@ -116,6 +120,7 @@ fn from_area(light: &AreaLightJson, scale: f64) -> Result<Emitter, String> {
         unit: IntensityUnit::Nits,
         range: None,
         spot: None,
+        weights: LightWeights::EVEN,
     })
 }
 
@@ -129,6 +134,7 @@ fn from_punctual(light: &Light<'_>) -> Result<Emitter, String> {
         unit: IntensityUnit::Candela,
         range: light.range(),
         spot: None,
+        weights: weights(&extras)?,
     };
     match light.kind() {
         Kind::Directional => {
@@ -199,6 +205,27 @@ fn shape(extras: &Map<String, Value>) -> Result<LightShape, String> {
             shorten(&shape.to_string())
         )),
     }
+}
+
+/// `"weights": [[1, 0], [0, 1]]`: brightness over a rectangle, rows from the top.
+fn weights(extras: &Map<String, Value>) -> Result<LightWeights, String> {
+    let Some(value) = extras.get("weights") else {
+        return Ok(LightWeights::EVEN);
+    };
+    let row = |row: &Value| -> Option<Vec<f32>> {
+        let numbers = row.as_array()?.iter();
+        numbers.map(|v| v.as_f64().map(|v| v as f32)).collect()
+    };
+    let rows: Option<Vec<Vec<f32>>> =
+        (value.as_array()).and_then(|rows| rows.iter().map(row).collect());
+    rows.filter(|rows| rows.windows(2).all(|pair| pair[0].len() == pair[1].len()))
+        .and_then(|rows| LightWeights::new(rows.first()?.len(), &rows.concat()))
+        .ok_or_else(|| {
+            format!(
+                "`weights` of its light is {}; give rows of equally many numbers of 0 or more, not all 0",
+                shorten(&value.to_string())
+            )
+        })
 }
 
 fn number(extras: &Map<String, Value>, key: &str) -> Result<Option<f64>, String> {

@@ -1,6 +1,6 @@
 //! The fan of rays: places on a light, with weights.
 
-use crate::light::LightShape;
+use crate::light::{AreaLight, LightShape};
 
 /// Rays that a table has room for: `MAX_RAYS` in `mdi/params.glsl`.
 pub(super) const MOST_RAYS: usize = 256;
@@ -8,17 +8,22 @@ pub(super) const MOST_RAYS: usize = 256;
 /// A place on the light, -1 to 1 along its axes, and the part of the light that it stands for.
 pub(super) type Ray = [f32; 4];
 
-/// `count` places spread evenly over the area of a light.
-pub(super) fn ray_table(shape: &LightShape, count: u32) -> Vec<Ray> {
+/// `count` places spread evenly over the area of a light; of an uneven one over its brightness, so that
+/// all stand for equal parts of its light.
+pub(super) fn ray_table(light: &AreaLight, count: u32) -> Vec<Ray> {
     let weight = 1.0 / count as f32;
     (0..count)
         .map(|index| {
-            let [x, y] = match shape {
+            let [x, y] = match light.shape {
                 LightShape::Point => [0.0, 0.0],
                 LightShape::Line { .. } => {
-                    [2.0 * (index as f64 + 0.5) / f64::from(count) - 1.0, 0.0]
+                    let part = (f64::from(index) + 0.5) / f64::from(count);
+                    [2.0 * light.profile.place_of(part) - 1.0, 0.0]
                 }
-                LightShape::Rect { .. } => square_place(index, count),
+                LightShape::Rect { .. } => {
+                    let place = square_place(index, count).map(|v| 0.5 * v + 0.5);
+                    light.weights.place_of(place).map(|v| 2.0 * v - 1.0)
+                }
                 _ => disk_place(square_place(index, count)),
             };
             [x as f32, y as f32, weight, 0.0]
@@ -52,6 +57,31 @@ fn disk_place([x, y]: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::light::LightWeights;
+    use glam::Vec3;
+
+    fn at(shape: LightShape) -> AreaLight {
+        AreaLight::new(shape, Vec3::ZERO, Vec3::NEG_Y, Vec3::X)
+    }
+
+    #[test]
+    fn rays_go_where_an_uneven_light_is_bright() {
+        let square = LightShape::Rect {
+            width: 1.0,
+            height: 1.0,
+        };
+        let weights = LightWeights::new(3, &[1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0]);
+        let light = AreaLight {
+            weights: weights.unwrap(),
+            ..at(square)
+        };
+        let mut corners = [0; 4];
+        for [x, y, weight, _] in ray_table(&light, 64) {
+            assert!(x.abs() >= 0.33 && y.abs() >= 0.33 && weight == 1.0 / 64.0);
+            corners[usize::from(x > 0.0) + 2 * usize::from(y > 0.0)] += 1;
+        }
+        assert!(corners.iter().all(|n| (15..=17).contains(n)), "{corners:?}");
+    }
 
     #[test]
     fn rays_cover_lights_evenly() {
@@ -67,7 +97,7 @@ mod tests {
             (LightShape::Line { length: 1.0 }, 1.0 / 3.0),
         ] {
             for count in [4, 36, 64, 256] {
-                let rays = ray_table(&shape, count);
+                let rays = ray_table(&at(shape), count);
                 let weights: f32 = rays.iter().map(|ray| ray[2]).sum();
                 assert!((weights - 1.0).abs() < 1.0e-5);
                 let mean: f32 = rays.iter().map(|ray| ray[0] * ray[2]).sum();

@@ -75,7 +75,8 @@ pub(super) fn mdi_views(
             options.rays,
             u32::from(options.random)
                 | (u32::from(options.footprint == Footprint::Pixel) << 1)
-                | (u32::from(options.dithered) << 2),
+                | (u32::from(options.dithered) << 2)
+                | (u32::from(light.is_uneven()) << 3),
         ],
         origin: origin.as_vec3().extend(0.0).to_array(),
         views: [LightView::default(); MAX_LIGHT_VIEWS],
@@ -125,7 +126,17 @@ pub(super) fn mdi_views(
         params.places[index] = places.map(|v| v as f32);
         params.nearest[index] = [cut.max(-1.0e30) as f32, 0.0, 0.0, 0.0];
     }
-    let mut rays = ray_table(&light.shape, options.rays);
+    // Random rays of an uneven light go to any place of a full table.
+    let drawn = options.random && light.is_uneven();
+    let places = if drawn {
+        MOST_RAYS as u32
+    } else {
+        options.rays
+    };
+    let mut rays = ray_table(light, places);
+    for ray in rays.iter_mut().filter(|_| drawn) {
+        ray[2] = 1.0 / options.rays as f32;
+    }
     rays.resize(MOST_RAYS, [0.0; 4]);
     MdiViews {
         count,

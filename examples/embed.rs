@@ -78,7 +78,11 @@ pub fn run(technique: &str) -> Outcome<Vec<u8>> {
     let mut uploaded = None;
     host.submit(0, |cmd| {
         gpu.begin_frame()?;
-        uploaded = Some(SceneBuffers::upload(&mut gpu, cmd, &scene)?);
+        let mut buffers = SceneBuffers::upload(&mut gpu, cmd, &scene)?;
+        if technique.reads_edges() {
+            buffers.add_edges(&mut gpu, cmd, &scene)?;
+        }
+        uploaded = Some(buffers);
         Ok(())
     })?;
     let buffers = uploaded.ok_or("nothing was uploaded")?;

@@ -95,3 +95,65 @@ fn influences_of_a_lines_ends_are_kept_too() {
     assert!(first.color == second.color);
     support::assert_no_messages(&renderer.destroy().unwrap());
 }
+
+/// Silhouettes depend on light and casters alone: a camera that moves does not search for them anew.
+#[test]
+fn silhouettes_stay_while_the_camera_moves() {
+    let _one = support::serial();
+    let blocker = plate("blocker", [-2.0, 0.0], [-2.0, 2.0], 5.0);
+    let still = scene(vec![floor(), blocker], LightShape::Disk { radius: 0.5 });
+    let mut renderer = FrameRenderer::owning(support::gpu(), still.clone()).unwrap();
+    let mut request = FrameRequest {
+        camera: camera(),
+        size: [SIZE; 2],
+        lights: vec![0],
+        technique: "pcss".parse().unwrap(),
+    };
+    // Nobody has asked for edges yet.
+    let without = renderer.render(&request).unwrap();
+    assert!(!without.counters.contains_key("edges"));
+    request.technique = "ssoc".parse().unwrap();
+    let searches = |names: &[String]| names.iter().filter(|n| n.contains("silhouettes.")).count();
+    let first = renderer.render_static(&request).unwrap();
+    assert_eq!(first.counters["edges"], 10);
+    assert_eq!(searches(&first.report.passes), 3);
+    assert_eq!(
+        searches(&renderer.render_static(&request).unwrap().report.passes),
+        0
+    );
+    request.camera.position.x += 0.1;
+    let moved = renderer.render_static(&request).unwrap();
+    assert_eq!(searches(&moved.report.passes), 0);
+    let kept = ["masks_kept", "silhouettes_kept", "edges_found"].map(|name| moved.counters[name]);
+    assert_eq!(kept, [0, 1, 1]);
+    assert!(moved.lights[0].visibility == renderer.render(&request).unwrap().lights[0].visibility);
+
+    let mut brighter = still.clone();
+    brighter.lights[0].light.center.x += 1.0;
+    renderer.set_scene(brighter).unwrap();
+    let other = renderer.render_static(&request).unwrap();
+    assert_eq!(searches(&other.report.passes), 3);
+    assert!(other.lights[0].visibility != moved.lights[0].visibility);
+
+    // Another moment of a mesh that a skin moves has the same edges, which are not sought again.
+    let mut posed = still;
+    posed.primitives[1].rest = posed.primitives[1].positions.clone();
+    renderer.set_scene(posed.clone()).unwrap();
+    let at_rest = renderer.render(&request).unwrap();
+    posed.primitives[1].positions[1].y += 0.5;
+    posed.finish().unwrap();
+    renderer.set_scene(posed.clone()).unwrap();
+    let bent = renderer.render(&request).unwrap();
+    assert_eq!(
+        (
+            at_rest.counters["edges_found"],
+            bent.counters["edges_found"]
+        ),
+        (2, 2)
+    );
+    support::assert_no_messages(&renderer.destroy().unwrap());
+    let mut anew = FrameRenderer::owning(support::gpu(), posed).unwrap();
+    let image = anew.render(&request).unwrap();
+    assert!(image.color == bent.color && image.color != at_rest.color);
+    support::assert_no_messages(&anew.destroy().unwrap());
+}

@@ -125,8 +125,11 @@ fn in_order(scene: &Scene) -> Vec<Edge> {
 /// The list that the device makes, as edges.
 fn found(scene: &Scene, light: AreaLight, rule: SilhouetteRule) -> Vec<Edge> {
     let mut gpu = support::gpu();
-    let buffers = gpu
+    let mut buffers = gpu
         .run(|gpu, cmd| SceneBuffers::upload(gpu, cmd, scene))
+        .unwrap();
+    assert!(!buffers.has_edges());
+    gpu.run(|gpu, cmd| buffers.add_edges(gpu, cmd, scene))
         .unwrap();
     let edges = buffers.edge_count();
     let usage = vk::BufferUsageFlags::TRANSFER_DST;
@@ -169,6 +172,7 @@ fn found(scene: &Scene, light: AreaLight, rule: SilhouetteRule) -> Vec<Edge> {
         casters: vec![true; buffers.draws().len()].into(),
         scene: &buffers,
         ids,
+        silhouettes: None,
     };
     let list = add_silhouettes(&mut graph, &inputs, "test", rule, 6);
     let host = HostBuffer {

@@ -2,10 +2,11 @@
 
 use super::dump::CapturedImage;
 use super::kept::KeptMasks;
+use super::kept_edges::KeptSilhouettes;
 use crate::gpu::GpuError;
 use crate::graph::{FakeMemory, FrameReport, Graph, GraphError, Plan};
 use crate::renderer::{
-    Frame, NamedLight, SceneBuffers, UploadError, add_frame, add_frame_with_masks,
+    Frame, NamedLight, SceneBuffers, UploadError, add_frame_with_masks, add_frame_with_silhouettes,
 };
 use crate::scene::{Scene, SceneCamera};
 use crate::shadow::{Technique, TechniqueError};
@@ -133,9 +134,9 @@ pub enum CaptureError {
 pub fn plan_frame(scene: &Scene, request: &FrameRequest) -> Result<Plan, CaptureError> {
     // The largest image that every Vulkan device of this engine's minimum can make.
     let lights = check(scene, request, 16384)?;
-    let buffers = SceneBuffers::plan_only(scene);
+    let buffers = SceneBuffers::plan_only(scene, request.technique.reads_edges());
     let mut graph = Graph::new();
-    let frame = declare(&mut graph, &buffers, request, &lights, None);
+    let frame = declare(&mut graph, &buffers, request, &lights, Earlier::default());
     graph.keep(frame.radiance);
     for visibility in frame.visibility {
         graph.keep(visibility);
@@ -195,20 +196,27 @@ pub(super) fn check(
     lights.collect()
 }
 
-/// Declares the frame, with the masks of an earlier one if there are any that fit.
+/// What earlier frames have made that fits.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Earlier<'k> {
+    pub(super) masks: Option<&'k KeptMasks>,
+    pub(super) silhouettes: Option<&'k KeptSilhouettes>,
+}
+
+/// Declares the frame.
 pub(super) fn declare<'f>(
     graph: &mut Graph<'f>,
     buffers: &'f SceneBuffers,
     request: &FrameRequest,
     lights: &[NamedLight],
-    kept: Option<&KeptMasks>,
+    earlier: Earlier<'_>,
 ) -> Frame {
     let (camera, size) = (&request.camera, request.size);
-    match kept {
-        Some(kept) => {
-            let masks = kept.import(graph);
-            add_frame_with_masks(graph, buffers, camera, size, lights, masks)
-        }
-        None => add_frame(graph, buffers, camera, size, lights, request.technique),
+    if let Some(kept) = earlier.masks {
+        let masks = kept.import(graph);
+        return add_frame_with_masks(graph, buffers, camera, size, lights, masks);
     }
+    let kept = earlier.silhouettes.map(|kept| kept.import(graph));
+    let (technique, kept) = (request.technique, kept.unwrap_or_default());
+    add_frame_with_silhouettes(graph, buffers, camera, size, lights, technique, &kept)
 }

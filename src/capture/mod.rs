@@ -3,6 +3,7 @@
 mod dump;
 mod frame;
 mod kept;
+mod kept_edges;
 mod render;
 
 #[cfg(feature = "cli")]

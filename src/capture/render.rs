@@ -1,8 +1,11 @@
 //! Whole frames on a device of our own, brought back to memory.
 
 use super::dump::{CapturedImage, Dump, Source};
-use super::frame::{CaptureError, CapturedFrame, CapturedLight, FrameRequest, check, declare};
+use super::frame::{
+    CaptureError, CapturedFrame, CapturedLight, Earlier, FrameRequest, check, declare,
+};
 use super::kept::KeptMasks;
+use super::kept_edges::KeptSilhouettes;
 use crate::gpu::{Buffer, Gpu, GpuError, MemoryLocation, ValidationMessage};
 use crate::graph::{
     Access, BufferDesc, BufferPart, BufferState, FrameCache, FrameReport, Graph, HostBuffer,
@@ -36,6 +39,8 @@ pub struct FrameRenderer<'s> {
     buffers: SceneBuffers,
     cache: FrameCache,
     kept: Option<KeptMasks>,
+    kept_silhouettes: Option<KeptSilhouettes>,
+    /// Of both.
     kept_filled: bool,
 }
 
@@ -53,6 +58,7 @@ impl<'s> FrameRenderer<'s> {
                 buffers,
                 cache: FrameCache::new(),
                 kept: None,
+                kept_silhouettes: None,
                 kept_filled: false,
             }),
             Err(error) => {
@@ -81,8 +87,10 @@ impl<'s> FrameRenderer<'s> {
         if !same {
             let upload = |gpu: &mut Gpu, cmd| SceneBuffers::upload(gpu, cmd, &scene);
             let buffers = self.gpu.run(upload)?;
+            let old_buffers = std::mem::replace(&mut self.buffers, buffers);
+            let earlier = (old_buffers, &*self.scene);
             // `run` has waited: no frame uses the old ones any more.
-            std::mem::replace(&mut self.buffers, buffers).destroy(&mut self.gpu);
+            (self.buffers.continue_edges(&scene, earlier)).destroy(&mut self.gpu);
         }
         if !same || self.scene.lights != scene.lights {
             self.forget_kept();
@@ -123,8 +131,9 @@ impl<'s> FrameRenderer<'s> {
     }
 
     /// As [`render`](Self::render), but what the technique made is kept, and used again while scene
-    /// and request stay as they are: such a frame has no pass of the technique. Its counter
-    /// `masks_kept` says for how many lights that was so.
+    /// and request stay as they are: such a frame has no pass of the technique. If only the camera
+    /// moves, silhouettes are not searched for again. The counters `masks_kept` and `silhouettes_kept`
+    /// say for how many lights that was so.
     pub fn render_static(&mut self, request: &FrameRequest) -> Result<CapturedFrame, CaptureError> {
         self.render_one(request, &[], Mode::Static)
     }
@@ -132,6 +141,9 @@ impl<'s> FrameRenderer<'s> {
     /// `run` has waited: nobody uses them any more.
     fn forget_kept(&mut self) {
         if let Some(kept) = self.kept.take() {
+            kept.destroy(&mut self.gpu);
+        }
+        if let Some(kept) = self.kept_silhouettes.take() {
             kept.destroy(&mut self.gpu);
         }
     }
@@ -145,14 +157,26 @@ impl<'s> FrameRenderer<'s> {
         let reuse = mode == Mode::Static;
         let most = self.gpu.info().limits.max_image_dimension2_d;
         let lights = check(&self.scene, request, most)?;
+        if request.technique.reads_edges() && !self.buffers.has_edges() {
+            let (buffers, scene) = (&mut self.buffers, &*self.scene);
+            self.gpu
+                .run(|gpu, cmd| buffers.add_edges(gpu, cmd, scene))?;
+        }
 
         let start = Instant::now();
         let pipelines = self.gpu.pipelines_created();
         let mut graph = Graph::continuing(self.cache.history());
         let filled = reuse && self.kept_filled;
-        let kept = (self.kept.as_ref()).filter(|kept| filled && kept.fit(request));
-        let masks_kept = kept.map_or(0, |_| lights.len());
-        let frame = declare(&mut graph, &self.buffers, request, &lights, kept);
+        let kept_edges = self.kept_silhouettes.as_ref();
+        let earlier = Earlier {
+            masks: (self.kept.as_ref()).filter(|kept| filled && kept.fit(request)),
+            silhouettes: kept_edges.filter(|kept| filled && kept.fit(request)),
+        };
+        let (masks_kept, silhouettes_kept) = (
+            earlier.masks.map_or(0, |_| lights.len()),
+            earlier.silhouettes.map_or(0, KeptSilhouettes::count),
+        );
+        let frame = declare(&mut graph, &self.buffers, request, &lights, earlier);
         if reuse && masks_kept == 0 {
             if let Some(old) = self.kept.take() {
                 old.destroy(&mut self.gpu);
@@ -160,6 +184,16 @@ impl<'s> FrameRenderer<'s> {
             let kept = KeptMasks::new(&mut self.gpu, request, &frame.masks)?;
             kept.fill(&mut graph, &frame.masks);
             self.kept = Some(kept);
+            if silhouettes_kept == 0 {
+                if let Some(old) = self.kept_silhouettes.take() {
+                    old.destroy(&mut self.gpu);
+                }
+                let kept = KeptSilhouettes::new(&mut self.gpu, &graph, request, &frame.masks)?;
+                if let Some(kept) = &kept {
+                    kept.fill(&mut graph, &frame.masks);
+                }
+                self.kept_silhouettes = kept;
+            }
             // Until the device has filled them they fit nothing.
             self.kept_filled = false;
         }
@@ -186,7 +220,7 @@ impl<'s> FrameRenderer<'s> {
                 color: wanted.take(0, bytes),
                 lights: wanted.lights(request, &frame, &plan, bytes),
                 images: wanted.images(bytes),
-                counters: self.counters(&plan, &report, created, masks_kept),
+                counters: self.counters(&plan, &report, created, [masks_kept, silhouettes_kept]),
                 passes,
                 frame_ms: (total_ms - aside_ms - copies_ms).max(0.0),
                 plan,
@@ -203,11 +237,10 @@ impl<'s> FrameRenderer<'s> {
         plan: &Plan,
         report: &FrameReport,
         pipelines: usize,
-        masks_kept: usize,
+        [masks_kept, silhouettes_kept]: [usize; 2],
     ) -> BTreeMap<String, u64> {
-        let counts = [
+        let mut counts = vec![
             ("barriers", report.barriers as u64),
-            ("edges", self.buffers.edge_count() as u64),
             ("masks_kept", masks_kept as u64),
             ("passes", report.passes.len() as u64),
             ("passes_culled", plan.culled.len() as u64),
@@ -220,7 +253,13 @@ impl<'s> FrameRenderer<'s> {
                 self.buffers.degenerate_count() as u64,
             ),
         ];
-        counts.map(|(name, count)| (name.to_string(), count)).into()
+        if self.buffers.has_edges() {
+            counts.push(("edges", self.buffers.edge_count() as u64));
+            counts.push(("edges_found", self.buffers.edges_found()));
+            counts.push(("silhouettes_kept", silhouettes_kept as u64));
+        }
+        let named = counts.into_iter();
+        named.map(|(name, n)| (name.to_string(), n)).collect()
     }
 
     /// The device.

@@ -4,11 +4,13 @@
 //! edge. Faces are known by their opposite corners alone: winding does not matter, and an edge may
 //! have one face (open), two, or more (non-manifold).
 //!
-//! A scene holds one moment: skins and morph targets are applied before, and corners that a seam has
-//! doubled carry the same weights, so they lie at the same position at every moment.
+//! A scene holds one moment: skins and morph targets are applied before. Where they move a primitive,
+//! corners at the same place of its [`rest`](crate::scene::Primitive::rest) are one point instead: edges
+//! are the same at every moment, whatever touches by chance and however weights are rounded. Only what
+//! a pose tears apart is two points then.
 
 use super::scene_layout::is_solid;
-use crate::scene::Scene;
+use crate::scene::{Primitive, Scene};
 use glam::Vec3;
 use std::collections::HashMap;
 
@@ -16,6 +18,9 @@ use std::collections::HashMap;
 pub(super) const NO_POINT: u32 = u32::MAX;
 /// Marks the place of further faces: `MORE_FACES` in `silhouettes/edges.glsl`.
 const MORE_FACES: u32 = 1 << 31;
+
+/// What rounding of weights may part the corners of one point by, as a part of the scene's size.
+const TORN: f32 = 1.0e-5;
 
 /// Points and edges of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,27 +34,86 @@ pub(super) struct Adjacency {
     pub edges: Vec<[u32; 4]>,
     /// Number of edges.
     pub edge_count: usize,
+    /// Point of each position of each solid primitive, in their order; [`NO_POINT`] where no triangle
+    /// uses it.
+    point_of: Vec<u32>,
+    /// Whether corners at one place of the rest pose are apart.
+    is_torn: bool,
+}
+
+/// Where corners have to be to be one point: node that moves them plus 1, or 0 for the scene, and a
+/// position.
+type Place = (usize, [u32; 3]);
+
+fn place_of(primitive: &Primitive, vertex: usize) -> Place {
+    let (node, position) = match primitive.rest.get(vertex) {
+        Some(rest) => (primitive.node.map_or(0, |node| node + 1), *rest),
+        None => (0, primitive.positions[vertex]),
+    };
+    // Both zeros are one place.
+    (node, (position + Vec3::ZERO).to_array().map(f32::to_bits))
+}
+
+fn solid_primitives(scene: &Scene) -> impl Iterator<Item = &Primitive> {
+    let all = scene.primitives.iter();
+    all.filter(|primitive| is_solid(scene, primitive))
+}
+
+/// Whether two moments of a scene have the same points and edges, if neither tears any apart.
+pub(super) fn same_topology(a: &Scene, b: &Scene) -> bool {
+    let alike = |a: &Primitive, b: &Primitive| {
+        let still = a.rest.is_empty() && b.rest.is_empty();
+        a.indices == b.indices
+            && a.node == b.node
+            && a.rest == b.rest
+            && a.positions.len() == b.positions.len()
+            && (!still || a.positions == b.positions)
+    };
+    let count = |scene: &Scene| solid_primitives(scene).count();
+    count(a) == count(b)
+        && solid_primitives(a)
+            .zip(solid_primitives(b))
+            .all(|(a, b)| alike(a, b))
 }
 
 impl Adjacency {
     /// Finds the edges of all triangles that block light as a whole: where a texture's alpha makes
     /// holes, the outline is the texture's.
     pub fn new(scene: &Scene) -> Self {
-        let mut welded: HashMap<[u32; 3], u32> = HashMap::new();
+        let torn = torn_at(scene);
+        // The first point at a place; those that a pose tears off it are few.
+        let mut welded: HashMap<Place, u32> = HashMap::new();
+        let mut torn_off: HashMap<Place, Vec<u32>> = HashMap::new();
         let mut positions: Vec<Vec3> = Vec::new();
+        let mut point_of: Vec<u32> = Vec::new();
         let mut halves: Vec<(u64, u32)> = Vec::with_capacity(3 * scene.triangle_count());
-        for primitive in &scene.primitives {
-            if !is_solid(scene, primitive) {
-                continue;
-            }
+        for primitive in solid_primitives(scene) {
+            let first = point_of.len();
+            point_of.resize(first + primitive.positions.len(), NO_POINT);
             let mut point = |index: &u32| {
-                let position = primitive.positions[*index as usize];
-                // Both zeros are one place.
-                let key = (position + Vec3::ZERO).to_array().map(f32::to_bits);
-                *welded.entry(key).or_insert_with(|| {
+                let vertex = *index as usize;
+                if point_of[first + vertex] != NO_POINT {
+                    return point_of[first + vertex];
+                }
+                let position = primitive.positions[vertex];
+                let place = place_of(primitive, vertex);
+                let next = positions.len() as u32;
+                let mut found = *welded.entry(place).or_insert(next);
+                let is_near = |point: u32| {
+                    (positions.get(point as usize)).is_none_or(|p| p.distance(position) <= torn)
+                };
+                if !is_near(found) {
+                    let others = torn_off.entry(place).or_default();
+                    found = others.iter().copied().find(|p| is_near(*p)).unwrap_or(next);
+                    if found == next {
+                        others.push(next);
+                    }
+                }
+                if found == next {
                     positions.push(position);
-                    positions.len() as u32 - 1
-                })
+                }
+                point_of[first + vertex] = found;
+                found
             };
             for corners in primitive.indices.chunks_exact(3) {
                 let [a, b, c] = [&corners[0], &corners[1], &corners[2]].map(&mut point);
@@ -70,6 +134,8 @@ impl Adjacency {
             points: points
                 .map(|(p, part)| p.extend(part as f32).to_array())
                 .collect(),
+            point_of,
+            is_torn: !torn_off.is_empty(),
             ..Self::default()
         };
         let edges = || halves.chunk_by(|a, b| a.0 == b.0);
@@ -101,6 +167,34 @@ impl Adjacency {
         found.edges.extend(more);
         found
     }
+
+    /// The same edges at another moment, of which [`same_topology`] holds; `None` where either moment
+    /// tears points apart. Equal to [`new`](Self::new) of that moment.
+    pub fn posed(mut self, scene: &Scene) -> Option<Self> {
+        if self.is_torn {
+            return None;
+        }
+        let torn = torn_at(scene);
+        let mut is_placed = vec![false; self.points.len()];
+        let positions = solid_primitives(scene).flat_map(|primitive| &primitive.positions);
+        for (point, position) in self.point_of.iter().zip(positions) {
+            let Some(known) = self.points.get_mut(*point as usize) else {
+                continue;
+            };
+            let [x, y, z, part] = *known;
+            let is_first = !std::mem::replace(&mut is_placed[*point as usize], true);
+            if is_first {
+                *known = position.extend(part).to_array();
+            } else if Vec3::new(x, y, z).distance(*position) > torn {
+                return None;
+            }
+        }
+        Some(self)
+    }
+}
+
+fn torn_at(scene: &Scene) -> f32 {
+    TORN * scene.bounds.radius()
 }
 
 /// Number of the connected part of each point, in the order of first points.
@@ -169,6 +263,58 @@ mod tests {
             assert_eq!(inner.copied().collect::<Vec<_>>(), [[0, 2, 1, 3]]);
             assert!(found.points.iter().all(|p| p[3] == 0.0));
         }
+    }
+
+    /// A square of two triangles that share no vertices, at rest and in a pose; the second triangle is
+    /// `apart` farther up than the first.
+    fn posed_square(lift: f32, apart: f32) -> Scene {
+        let [a, b, c, d] = SQUARE;
+        let mut square = mesh(&[a, b, c, c, d, a], &[0, 1, 2, 3, 4, 5]);
+        square.rest = square.positions.clone();
+        square.node = Some(3);
+        for (vertex, position) in square.positions.iter_mut().enumerate() {
+            position.z += lift * position.x + if vertex < 3 { 0.0 } else { apart };
+        }
+        // Touches a corner of the square in one pose only.
+        let other = mesh(
+            &[[1.0, 0.0, 0.5], [3.0, 0.0, 0.5], [3.0, 1.0, 0.5]],
+            &[0, 1, 2],
+        );
+        let mut scene = scene(vec![square, other]);
+        scene.finish().unwrap();
+        scene
+    }
+
+    #[test]
+    fn a_pose_changes_no_edges() {
+        let rest = Adjacency::new(&posed_square(0.0, 0.0));
+        assert_eq!((rest.points.len(), rest.edge_count), (7, 8));
+        for (lift, apart) in [(0.5, 0.0), (0.25, 1.0e-6)] {
+            let scene = posed_square(lift, apart);
+            assert!(same_topology(&posed_square(0.0, 0.0), &scene));
+            let anew = Adjacency::new(&scene);
+            assert_eq!(anew.edges, rest.edges);
+            assert_ne!(anew.points, rest.points);
+            assert_eq!(rest.clone().posed(&scene), Some(anew));
+        }
+        // Welded by positions alone the pose would join what only touches.
+        let mut touching = posed_square(0.5, 0.0);
+        touching.primitives[0].rest.clear();
+        assert_eq!(Adjacency::new(&touching).points.len(), 6);
+    }
+
+    #[test]
+    fn what_a_pose_tears_apart_is_open() {
+        let rest = Adjacency::new(&posed_square(0.0, 0.0));
+        let torn = posed_square(0.0, 0.1);
+        let anew = Adjacency::new(&torn);
+        assert_eq!((anew.points.len(), anew.edge_count), (9, 9));
+        assert_eq!(rest.posed(&torn), None);
+        assert_eq!(anew.posed(&posed_square(0.0, 0.0)), None);
+        assert!(!same_topology(
+            &torn,
+            &scene(vec![mesh(&SQUARE, &[0, 1, 2])])
+        ));
     }
 
     #[test]

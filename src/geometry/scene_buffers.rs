@@ -1,6 +1,6 @@
 //! The scene on the device: vertices and indices to draw, triangles and materials to look up.
 
-use super::adjacency::Adjacency;
+use super::adjacency::{Adjacency, same_topology};
 use super::cover::Cover;
 use super::hierarchy;
 use super::neighbours::neighbours;
@@ -69,7 +69,7 @@ pub struct Draw {
     pub mask: Option<u32>,
 }
 
-/// The scene's buffers and images on the device. Static: uploaded once.
+/// The scene's buffers and images on the device. Static: uploaded once; edges once they are asked for.
 #[derive(Debug)]
 pub struct SceneBuffers {
     /// None in a stand-in that only plans ([`SceneBuffers::plan_only`]).
@@ -80,7 +80,10 @@ pub struct SceneBuffers {
     bounds: Aabb,
     triangles: usize,
     degenerate: usize,
-    edges: usize,
+    /// Not yet on the device if there is no `edges`.
+    adjacency: Option<Adjacency>,
+    edges: Option<usize>,
+    edges_found: u64,
     masked: bool,
     textured: usize,
     shiny: bool,
@@ -89,9 +92,11 @@ pub struct SceneBuffers {
 
 /// Number of buffers: vertices, texture coordinates of masked ones, indices.
 const BUFFERS: usize = 3;
-/// Number of images: triangles, texture coordinates, materials, texels, hierarchy, edges, their ends,
-/// neighbours.
+/// Number of images: triangles, texture coordinates, materials, texels, hierarchy, neighbours, edges,
+/// their ends.
 const IMAGES: usize = 8;
+/// Place of the edges among the images; that of their ends is the next.
+const EDGES: usize = 6;
 
 #[derive(Debug)]
 struct DeviceBuffers {
@@ -124,7 +129,8 @@ pub struct SceneIds {
     pub texels: ImageId,
     /// Bounding volume hierarchy of the triangles: `common/hierarchy.glsl`.
     pub hierarchy: ImageId,
-    /// RGBA32_UINT: edges with the faces that meet there, `silhouettes/edges.glsl`.
+    /// RGBA32_UINT: edges with the faces that meet there, `silhouettes/edges.glsl`; a texel of
+    /// nothing before [`SceneBuffers::add_edges`].
     pub edges: ImageId,
     /// RGBA32F: ends of edges.
     pub points: ImageId,
@@ -140,7 +146,8 @@ impl SceneIds {
 }
 
 impl SceneBuffers {
-    /// Records the upload of a scene into `cmd`. Later commands on the same queue can use it at
+    /// Records the upload of a scene into `cmd`, all but its edges, which few techniques read
+    /// ([`add_edges`](Self::add_edges)). Later commands on the same queue can use it at
     /// once; what it was copied from is freed when the frame's slot begins anew.
     pub fn upload(
         gpu: &mut Gpu,
@@ -160,14 +167,9 @@ impl SceneBuffers {
         if texels > most {
             return Err(UploadError::TooManyTexels { texels, most });
         }
-        let adjacency = Adjacency::new(scene);
-        let edges = adjacency.edges.len();
-        if edges > most {
-            return Err(UploadError::TooManyEdges { edges, most });
-        }
-        let mut buffers = Self::without_device(scene, &layout, &adjacency);
+        let mut buffers = Self::without_device(scene, &layout);
         let mut staging = Vec::new();
-        let device = buffers.make(gpu, cmd, &layout, &adjacency, &mut staging);
+        let device = buffers.make(gpu, cmd, &layout, &mut staging);
         for buffer in staging {
             gpu.retire(Retired::Buffer(buffer));
         }
@@ -177,18 +179,87 @@ impl SceneBuffers {
     }
 
     /// A stand-in without device, for planning frames of a scene on a device with all optional
-    /// features.
-    pub fn plan_only(scene: &Scene) -> Self {
-        Self::without_device(scene, &Layout::new(scene), &Adjacency::new(scene))
+    /// features; with the scene's edges if asked for.
+    pub fn plan_only(scene: &Scene, with_edges: bool) -> Self {
+        let mut buffers = Self::without_device(scene, &Layout::new(scene));
+        if with_edges {
+            let adjacency = Adjacency::new(scene);
+            buffers.sizes.set_edges(&adjacency);
+            buffers.edges = Some(adjacency.edge_count);
+        }
+        buffers
     }
 
-    fn without_device(scene: &Scene, layout: &Layout, adjacency: &Adjacency) -> Self {
-        let image = |format: vk::Format, texels: usize| {
-            let rows = texels.div_ceil(IMAGE_WIDTH).max(1) as u32;
-            // Nothing to hold: a single texel, so that there is something to bind.
-            let width = if texels == 0 { 1 } else { IMAGE_WIDTH as u32 };
-            ImageDesc::new(format, width, rows)
-        };
+    /// Finds the edges of the scene that was uploaded and records their upload into `cmd`, for
+    /// techniques that read them ([`Technique::reads_edges`](crate::shadow::Technique::reads_edges)).
+    /// Does nothing if they are there.
+    ///
+    /// # Errors
+    /// [`UploadError::TooManyEdges`] or what the device says; nothing has changed then.
+    pub fn add_edges(
+        &mut self,
+        gpu: &mut Gpu,
+        cmd: vk::CommandBuffer,
+        scene: &Scene,
+    ) -> Result<(), UploadError> {
+        if self.edges.is_some() {
+            return Ok(());
+        }
+        let adjacency = self.adjacency.take().unwrap_or_else(|| {
+            self.edges_found += 1;
+            Adjacency::new(scene)
+        });
+        let most = gpu.info().limits.max_image_dimension2_d as usize * IMAGE_WIDTH;
+        let edges = adjacency.edges.len();
+        if edges > most {
+            return Err(UploadError::TooManyEdges { edges, most });
+        }
+        let before = self.sizes;
+        self.sizes.set_edges(&adjacency);
+        let mut staging = Vec::new();
+        let mut made = Vec::new();
+        let contents: [(&str, &[u8]); 2] = [
+            ("scene edges", bytemuck::cast_slice(&adjacency.edges)),
+            ("scene points", bytemuck::cast_slice(&adjacency.points)),
+        ];
+        let descs = &self.sizes.images[EDGES..];
+        let result = record_uploads(gpu, cmd, |gpu, graph| {
+            upload_images(gpu, graph, &contents, descs, &mut staging, &mut made)
+        });
+        for buffer in staging {
+            gpu.retire(Retired::Buffer(buffer));
+        }
+        // What was there before, or what will not be used, may be in commands already recorded.
+        match (result, &mut self.device) {
+            (Ok(()), Some(device)) => {
+                for (place, image) in device.images[EDGES..].iter_mut().zip(made) {
+                    gpu.retire(Retired::Image(std::mem::replace(place, image)));
+                }
+                self.edges = Some(adjacency.edge_count);
+                self.adjacency = Some(adjacency);
+                Ok(())
+            }
+            (result, _) => {
+                made.into_iter().for_each(|i| gpu.retire(Retired::Image(i)));
+                self.sizes = before;
+                result
+            }
+        }
+    }
+
+    /// Takes over what is known of the edges of another moment of the scene, if they are the same:
+    /// [`add_edges`](Self::add_edges) does not have to find them anew.
+    pub fn continue_edges(&mut self, scene: &Scene, earlier: (Self, &Scene)) -> Self {
+        let (mut buffers, before) = earlier;
+        self.edges_found += buffers.edges_found;
+        if self.adjacency.is_none() && same_topology(before, scene) {
+            self.adjacency = (buffers.adjacency.take()).and_then(|known| known.posed(scene));
+        }
+        buffers
+    }
+
+    fn without_device(scene: &Scene, layout: &Layout) -> Self {
+        let image = image_of;
         let buffer = |bytes: usize, usage: vk::BufferUsageFlags| (bytes.max(4) as u64, usage);
         let floats = vk::Format::R32G32B32A32_SFLOAT;
         let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
@@ -210,9 +281,10 @@ impl SceneBuffers {
                     image(floats, layout.materials.len()),
                     image(vk::Format::R8G8B8A8_SRGB, layout.texels.len()),
                     image(floats, hierarchy::NODE_TEXELS * nodes),
-                    image(vk::Format::R32G32B32A32_UINT, adjacency.edges.len()),
-                    image(floats, adjacency.points.len()),
                     image(vk::Format::R32G32B32A32_UINT, layout.triangles.len() / 4),
+                    // Edges and their ends, of which there are none yet.
+                    image(vk::Format::R32G32B32A32_UINT, 0),
+                    image(floats, 0),
                 ],
             },
             draws: layout.draws.clone(),
@@ -220,7 +292,9 @@ impl SceneBuffers {
             bounds: scene.bounds,
             triangles: layout.indices.len() / 3,
             degenerate: layout.degenerate,
-            edges: adjacency.edge_count,
+            adjacency: None,
+            edges: None,
+            edges_found: 0,
             masked: !layout.mask_uvs.is_empty(),
             textured: layout.triangle_uvs.len() / 2,
             shiny: scene
@@ -236,14 +310,13 @@ impl SceneBuffers {
         gpu: &mut Gpu,
         cmd: vk::CommandBuffer,
         layout: &Layout,
-        adjacency: &Adjacency,
         staging: &mut Vec<Buffer>,
     ) -> Result<DeviceBuffers, UploadError> {
         let mut made = DeviceBuffers {
             buffers: Vec::with_capacity(BUFFERS),
             images: Vec::with_capacity(IMAGES),
         };
-        let result = self.fill(gpu, cmd, layout, adjacency, staging, &mut made);
+        let result = self.fill(gpu, cmd, layout, staging, &mut made);
         match result {
             Ok(()) => Ok(made),
             Err(error) => {
@@ -265,23 +338,14 @@ impl SceneBuffers {
         gpu: &mut Gpu,
         cmd: vk::CommandBuffer,
         layout: &Layout,
-        adjacency: &Adjacency,
         staging: &mut Vec<Buffer>,
         made: &mut DeviceBuffers,
     ) -> Result<(), UploadError> {
-        let mut graph = Graph::new();
         let buffers: [(&str, &[u8]); BUFFERS] = [
             ("scene vertices", bytemuck::cast_slice(&layout.vertices)),
             ("scene mask uvs", bytemuck::cast_slice(&layout.mask_uvs)),
             ("scene indices", bytemuck::cast_slice(&layout.indices)),
         ];
-        for ((name, bytes), (size, usage)) in buffers.into_iter().zip(self.sizes.buffers) {
-            let usage = usage | vk::BufferUsageFlags::TRANSFER_DST;
-            let buffer = gpu.create_buffer(name, size, usage, MemoryLocation::GpuOnly)?;
-            let uploaded = upload_buffer(gpu, &mut graph, &buffer, bytes, staging);
-            made.buffers.push(buffer);
-            uploaded?;
-        }
         let neighbours = neighbours(&layout.triangles);
         let nodes = hierarchy::nodes(&layout.triangles, &neighbours);
         let images: [(&str, &[u8]); IMAGES] = [
@@ -293,24 +357,27 @@ impl SceneBuffers {
             ("scene materials", bytemuck::cast_slice(&layout.materials)),
             ("scene texels", bytemuck::cast_slice(&layout.texels)),
             ("scene hierarchy", bytemuck::cast_slice(&nodes)),
-            ("scene edges", bytemuck::cast_slice(&adjacency.edges)),
-            ("scene points", bytemuck::cast_slice(&adjacency.points)),
             ("scene neighbours", bytemuck::cast_slice(&neighbours)),
+            ("scene edges", &[]),
+            ("scene points", &[]),
         ];
-        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-        for ((name, bytes), desc) in images.into_iter().zip(self.sizes.images) {
-            let spec = ImageSpec::new_2d(desc.format, desc.width, desc.height, usage);
-            let image = gpu.create_image(name, &spec)?;
-            let uploaded = upload_image(gpu, &mut graph, &image, desc, bytes, staging);
-            made.images.push(image);
-            uploaded?;
-        }
-        let compiled = graph.compile(gpu)?;
-        let mut cache = FrameCache::new();
-        let recorded = compiled.record(gpu, &mut cache, cmd);
-        cache.destroy(gpu);
-        recorded?;
-        Ok(())
+        record_uploads(gpu, cmd, |gpu, graph| {
+            for ((name, bytes), (size, usage)) in buffers.into_iter().zip(self.sizes.buffers) {
+                let usage = usage | vk::BufferUsageFlags::TRANSFER_DST;
+                let buffer = gpu.create_buffer(name, size, usage, MemoryLocation::GpuOnly)?;
+                let uploaded = upload_buffer(gpu, graph, &buffer, bytes, staging);
+                made.buffers.push(buffer);
+                uploaded?;
+            }
+            upload_images(
+                gpu,
+                graph,
+                &images,
+                &self.sizes.images,
+                staging,
+                &mut made.images,
+            )
+        })
     }
 
     /// Destroys everything; no frame may still use it.
@@ -373,9 +440,20 @@ impl SceneBuffers {
         self.degenerate
     }
 
-    /// Number of edges at which triangles meet or end.
+    /// Whether the edges are there: [`add_edges`](Self::add_edges).
+    pub fn has_edges(&self) -> bool {
+        self.edges.is_some()
+    }
+
+    /// Number of edges at which triangles meet or end; 0 before [`add_edges`](Self::add_edges).
     pub fn edge_count(&self) -> usize {
-        self.edges
+        self.edges.unwrap_or(0)
+    }
+
+    /// How often edges were found on the host, in earlier moments of the scene too
+    /// ([`continue_edges`](Self::continue_edges)).
+    pub fn edges_found(&self) -> u64 {
+        self.edges_found
     }
 
     /// Number of triangles with texture coordinates, which come before all others.
@@ -455,9 +533,9 @@ impl SceneBuffers {
             materials: image("scene.materials", 2),
             texels: image("scene.texels", 3),
             hierarchy: image("scene.hierarchy", 4),
-            edges: image("scene.edges", 5),
-            points: image("scene.points", 6),
-            neighbours: image("scene.neighbours", 7),
+            neighbours: image("scene.neighbours", 5),
+            edges: image("scene.edges", EDGES),
+            points: image("scene.points", EDGES + 1),
         }
     }
 }
@@ -469,6 +547,55 @@ const STATIC: ImageState = ImageState {
     stages: vk::PipelineStageFlags2::NONE,
     access: vk::AccessFlags2::NONE,
 };
+
+impl Sizes {
+    fn set_edges(&mut self, adjacency: &Adjacency) {
+        self.images[EDGES] = image_of(self.images[EDGES].format, adjacency.edges.len());
+        self.images[EDGES + 1] = image_of(self.images[EDGES + 1].format, adjacency.points.len());
+    }
+}
+
+fn image_of(format: vk::Format, texels: usize) -> ImageDesc {
+    let rows = texels.div_ceil(IMAGE_WIDTH).max(1) as u32;
+    // Nothing to hold: a single texel, so that there is something to bind.
+    let width = if texels == 0 { 1 } else { IMAGE_WIDTH as u32 };
+    ImageDesc::new(format, width, rows)
+}
+
+/// Records the copies that `declare` declares.
+fn record_uploads(
+    gpu: &mut Gpu,
+    cmd: vk::CommandBuffer,
+    declare: impl FnOnce(&mut Gpu, &mut Graph<'_>) -> Result<(), GpuError>,
+) -> Result<(), UploadError> {
+    let mut graph = Graph::new();
+    declare(gpu, &mut graph)?;
+    let compiled = graph.compile(gpu)?;
+    let mut cache = FrameCache::new();
+    let recorded = compiled.record(gpu, &mut cache, cmd);
+    cache.destroy(gpu);
+    recorded?;
+    Ok(())
+}
+
+fn upload_images(
+    gpu: &mut Gpu,
+    graph: &mut Graph<'_>,
+    contents: &[(&str, &[u8])],
+    descs: &[ImageDesc],
+    staging: &mut Vec<Buffer>,
+    made: &mut Vec<Image>,
+) -> Result<(), GpuError> {
+    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+    for ((name, bytes), desc) in contents.iter().zip(descs) {
+        let spec = ImageSpec::new_2d(desc.format, desc.width, desc.height, usage);
+        let image = gpu.create_image(name, &spec)?;
+        let uploaded = upload_image(gpu, graph, &image, *desc, bytes, staging);
+        made.push(image);
+        uploaded?;
+    }
+    Ok(())
+}
 
 /// Brings `bytes`, filled up with zeros to `size`, to a buffer that copies can be made from.
 fn stage(

@@ -22,6 +22,7 @@ use crate::geometry::{add_gbuffer, add_tile_bounds};
 use crate::graph::{Access, BufferDesc, BufferId, BufferPart, Graph, ImageId, PassKind};
 use crate::light::AreaLight;
 use crate::scene::SceneCamera;
+use crate::shadow::silhouettes::Silhouettes;
 use crate::shadow::{LightParams, ShadowInputs, ShadowMask, Technique, ViewParams, casters};
 use std::ops::Range;
 
@@ -67,6 +68,9 @@ pub struct Visibilities {
 /// Declares every light's visibility at the surfaces of a G-buffer of `size` pixels: that of
 /// [`add_gbuffer`], or a host's own with the same meaning. `ids` is what
 /// [`SceneBuffers::import`] returned for this graph.
+///
+/// # Panics
+/// If the technique reads edges and the scene has none yet ([`SceneBuffers::add_edges`]).
 pub fn add_visibility<'f>(
     graph: &mut Graph<'f>,
     (scene, ids): (&'f SceneBuffers, SceneIds),
@@ -76,6 +80,18 @@ pub fn add_visibility<'f>(
     lights: &[NamedLight],
     technique: Technique,
 ) -> Visibilities {
+    let surfaces = (gbuffer, camera, size);
+    visibilities(graph, (scene, ids), surfaces, lights, technique, &[])
+}
+
+fn visibilities<'f>(
+    graph: &mut Graph<'f>,
+    (scene, ids): (&'f SceneBuffers, SceneIds),
+    (gbuffer, camera, size): (GBuffer, &SceneCamera, [u32; 2]),
+    lights: &[NamedLight],
+    technique: Technique,
+    silhouettes: &[Option<Silhouettes>],
+) -> Visibilities {
     let pixels = PixelCamera::new(camera, size);
     let (params, parts) = add_params(graph, pixels, lights);
     let tile_bounds = add_tile_bounds(graph, &gbuffer, size);
@@ -84,7 +100,7 @@ pub fn add_visibility<'f>(
     let receivers = visible_hulls(camera, size, boxes, scene.covers());
     let mut masks = Vec::with_capacity(lights.len());
     let mut passes = Vec::with_capacity(lights.len());
-    for (light, part) in lights.iter().zip(&parts) {
+    for (at, (light, part)) in lights.iter().zip(&parts).enumerate() {
         let first = graph.pass_count();
         masks.push(technique.add_passes(
             graph,
@@ -100,6 +116,7 @@ pub fn add_visibility<'f>(
                 casters: casters(&light.light, &receivers, scene),
                 scene,
                 ids,
+                silhouettes: silhouettes.get(at).copied().flatten(),
             },
         ));
         passes.push(first..graph.pass_count());
@@ -113,6 +130,9 @@ pub fn add_visibility<'f>(
 }
 
 /// Declares a picture of `size` pixels: surfaces, visibility of every light, shading.
+///
+/// # Panics
+/// As [`add_visibility`].
 pub fn add_frame<'f>(
     graph: &mut Graph<'f>,
     scene: &'f SceneBuffers,
@@ -121,16 +141,31 @@ pub fn add_frame<'f>(
     lights: &[NamedLight],
     technique: Technique,
 ) -> Frame {
+    add_frame_with_silhouettes(graph, scene, camera, size, lights, technique, &[])
+}
+
+/// As [`add_frame`], with the lists of silhouettes of an earlier frame, in which lights, scene and
+/// technique were the same, for the lights that have one ([`ShadowMask::silhouettes`]): those lights
+/// search for none. `silhouettes` are of this graph.
+pub fn add_frame_with_silhouettes<'f>(
+    graph: &mut Graph<'f>,
+    scene: &'f SceneBuffers,
+    camera: &SceneCamera,
+    size: [u32; 2],
+    lights: &[NamedLight],
+    technique: Technique,
+    silhouettes: &[Option<Silhouettes>],
+) -> Frame {
     let ids = scene.import(graph);
     let gbuffer = add_gbuffer(graph, scene, &ids, camera, size);
-    let found = add_visibility(
+    let surfaces = (gbuffer, camera, size);
+    let found = visibilities(
         graph,
         (scene, ids),
-        gbuffer,
-        camera,
-        size,
+        surfaces,
         lights,
         technique,
+        silhouettes,
     );
     shaded(graph, (scene, &ids), gbuffer, camera, lights, found)
 }

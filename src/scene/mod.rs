@@ -69,6 +69,9 @@ pub struct Primitive {
     pub material: usize,
     /// Scene space, metres.
     pub positions: Vec<Vec3>,
+    /// Where the positions would be without skin and morph targets, in a space of the node's; empty for
+    /// a mesh that neither moves. Says which corners are one point of the surface at every moment.
+    pub rest: Vec<Vec3>,
     /// Unit shading normals, one for each position. The geometric normal is the triangle's own.
     pub normals: Vec<Vec3>,
     /// Where each position lies in the material's base texture: (0, 0) is the image's top left
@@ -159,6 +162,11 @@ impl Scene {
                      normal a position and three indices a triangle",
                     primitive.indices.len()
                 );
+                return Err(invalid(label(), reason));
+            }
+            let rest = primitive.rest.len();
+            if rest != 0 && rest != vertices {
+                let reason = format!("it has {vertices} positions and {rest} rest positions");
                 return Err(invalid(label(), reason));
             }
             let uvs = primitive.uvs.len();
@@ -292,13 +300,17 @@ mod tests {
     #[test]
     fn finish_names_what_is_wrong() {
         type Break = fn(&mut Scene);
-        let broken: [(Break, &str); 9] = [
+        let broken: [(Break, &str); 10] = [
             (|s| s.primitives[0].indices[1] = 4, "names vertex 4 of 4"),
             (|s| s.primitives[0].material = 1, "material 1"),
             (|s| s.primitives[0].positions[3].y = f32::NAN, "vertex 3"),
             (|s| s.primitives[0].positions[0].x = 2e9, "vertex 0"),
             (|s| s.primitives[0].normals[2] = Vec3::ZERO, "vertex 2"),
             (|s| s.primitives[0].indices.truncate(2), "2 indices"),
+            (
+                |s| s.primitives[0].rest = vec![Vec3::ZERO; 2],
+                "2 rest positions",
+            ),
             (|s| s.primitives.clear(), "no triangles"),
             (|s| s.materials[0].base_color.x = f32::NAN, "material 0"),
             (

@@ -28,6 +28,7 @@ use crate::graph::{BufferId, BufferPart, ImageId};
 use crate::light::AreaLight;
 use crate::scene::SceneCamera;
 use glam::DVec3;
+use silhouettes::Silhouettes;
 use std::rc::Rc;
 
 /// What a technique is given for one light.
@@ -55,6 +56,9 @@ pub struct ShadowInputs<'f> {
     pub scene: &'f SceneBuffers,
     /// The scene's resources in this graph.
     pub ids: SceneIds,
+    /// The list of silhouettes of an earlier frame ([`ShadowMask::silhouettes`]) in which light, scene
+    /// and technique were the same, to be used again.
+    pub silhouettes: Option<Silhouettes>,
 }
 
 /// What a technique makes for one light. All images are of the picture's size.
@@ -68,6 +72,8 @@ pub struct ShadowMask {
     pub end_influences: Option<ImageId>,
     /// R32F: a bound on the error of `visibility`; `None` where the technique proves none.
     pub error_bound: Option<ImageId>,
+    /// The list of silhouettes that it was made with, worth keeping while light and scene stay.
+    pub silhouettes: Option<Silhouettes>,
     /// What can be counted of the work, if anything.
     pub tally: Option<Tally>,
 }
@@ -88,6 +94,7 @@ impl ShadowMask {
             visibility,
             end_influences: None,
             error_bound: None,
+            silhouettes: None,
             tally: None,
         }
     }

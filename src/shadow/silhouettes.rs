@@ -56,10 +56,17 @@ impl Silhouettes {
     }
 }
 
+/// Size of [`Silhouettes::arguments`].
+pub(crate) const ARGUMENTS_BYTES: u64 = 32;
+
 /// Edges that one invocation classifies.
 const RUN: u32 = 32;
 
-/// Declares the passes. `vertices` is how many the consumer draws for each edge.
+/// Declares the passes, or none if the inputs bring the list of an earlier frame. `vertices` is how
+/// many the consumer draws for each edge.
+///
+/// # Panics
+/// If the scene's edges have not been found: [`crate::geometry::SceneBuffers::add_edges`].
 pub fn add_silhouettes(
     graph: &mut Graph<'_>,
     inputs: &ShadowInputs<'_>,
@@ -68,6 +75,13 @@ pub fn add_silhouettes(
     vertices: u32,
 ) -> Silhouettes {
     let name = &inputs.light_name;
+    if let Some(kept) = inputs.silhouettes {
+        return kept;
+    }
+    assert!(
+        inputs.scene.has_edges(),
+        "the scene's edges are added before they are read"
+    );
     let edge_count = inputs.scene.edge_count() as u32;
     let runs = edge_count.div_ceil(RUN).max(1);
     let size = u64::from(runs) * 4;
@@ -77,7 +91,7 @@ pub fn add_silhouettes(
     };
     let masks = buffer("masks", size);
     let offsets = buffer("offsets", size);
-    let arguments = buffer("arguments", 32);
+    let arguments = buffer("arguments", ARGUMENTS_BYTES);
     let [width, height] = image_place(edge_count as usize);
     let desc = ImageDesc::new(vk::Format::R32_UINT, width, height);
     let list = graph.create_image(format!("{technique}.silhouettes {name}"), desc);

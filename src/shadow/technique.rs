@@ -370,6 +370,12 @@ impl Technique {
         })
     }
 
+    /// Whether it reads the scene's edges
+    /// ([`SceneBuffers::add_edges`](crate::renderer::SceneBuffers::add_edges)).
+    pub fn reads_edges(self) -> bool {
+        matches!(self, Self::Ssoc(_) | Self::Dbuffer(_))
+    }
+
     /// Declares the passes that make one light's visibility.
     pub fn add_passes<'f>(self, graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -> ShadowMask {
         match self {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use gltf::{Document, Mesh};
 
 use super::accessor::Accessors;
@@ -55,20 +55,22 @@ impl LocalPrimitive {
                 triangle.swap(1, 2);
             }
         }
-        let (positions, normals, uvs) = match moved.normals {
+        let rest = self.rest(placement);
+        let (positions, rest, normals, uvs) = match moved.normals {
             Some(normals) => {
                 let normals = unit_normals(&normals, &moved.positions, &indices);
-                (moved.positions, normals, self.uvs.clone())
+                (moved.positions, rest, normals, self.uvs.clone())
             }
             None => {
                 // A normal a triangle, so triangles cannot share vertices.
                 let positions = gather(&moved.positions, &indices);
+                let rest = gather(&rest, &indices);
                 let uvs = gather(&self.uvs, &indices);
                 // At most as many as there were indices, which are 32-bit themselves.
                 indices = (0u32..).take(positions.len()).collect();
                 let faces = face_normals(&positions, &indices);
                 let normals = faces.into_iter().map(unit_or_up).collect();
-                (positions, normals, uvs)
+                (positions, rest, normals, uvs)
             }
         };
         Primitive {
@@ -79,12 +81,26 @@ impl LocalPrimitive {
                 .iter()
                 .map(|position| position.as_vec3())
                 .collect(),
+            rest,
             normals: normals
                 .iter()
                 .map(|normal: &DVec3| normal.as_vec3())
                 .collect(),
             uvs,
             indices,
+        }
+    }
+
+    /// Positions before skin and morph targets: in the scene, or in the mesh's space if a skin moves
+    /// it; empty where neither does.
+    fn rest(&self, placement: &Placement) -> Vec<Vec3> {
+        let own = self.positions.iter();
+        match placement {
+            Placement::Skinned(_) => self.positions.clone(),
+            Placement::Rigid(_) if self.targets.is_empty() => Vec::new(),
+            Placement::Rigid(matrix) => own
+                .map(|position| matrix.transform_point3(position.as_dvec3()).as_vec3())
+                .collect(),
         }
     }
 

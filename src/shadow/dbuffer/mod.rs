@@ -157,6 +157,7 @@ fn lit_by<'f>(
         casters: casters(&light, &inputs.receivers, inputs.scene),
         scene: inputs.scene,
         ids: inputs.ids,
+        silhouettes: inputs.silhouettes,
     }
 }
 

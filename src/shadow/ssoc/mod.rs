@@ -132,7 +132,11 @@ pub(super) fn add_passes<'f>(
     let map = add_maps_of_size(graph, inputs, NAME, &views, target, options.resolution);
     let list = add_silhouettes(graph, inputs, NAME, SilhouetteRule::Center, VERTICES);
     let bands = add_bands(graph, inputs, &options, &views, buffer, map.depth, list);
-    add_visibility(graph, inputs, &options, buffer, map, bands)
+    let visibility = add_visibility(graph, inputs, &options, buffer, map, bands);
+    ShadowMask {
+        silhouettes: Some(list),
+        ..ShadowMask::new(visibility)
+    }
 }
 
 /// Distance of the farthest receiver from the light's centre; of a sun the depth along its
@@ -225,7 +229,7 @@ fn add_visibility<'f>(
     params: BufferId,
     map: ShadowMap,
     bands: ImageId,
-) -> ShadowMask {
+) -> ImageId {
     let ShadowMap {
         depth: map_depth,
         ids: Some(map_ids),
@@ -297,5 +301,5 @@ fn add_visibility<'f>(
         ctx.bind_compute(&pipeline, &bindings, &[])?;
         list.dispatch(ctx)
     });
-    ShadowMask::new(visibility)
+    visibility
 }

@@ -268,7 +268,7 @@ fn overlaps_count_once() {
     }
 }
 
-/// A7: light goes on evenly where the hard shadow of a cube ends; with all shapes of lights.
+/// With all shapes of lights.
 #[test]
 fn a_cube_has_even_penumbrae_under_every_light() {
     let _one = support::serial();
@@ -419,6 +419,51 @@ fn an_edge_tilted_a_little_does_the_same() {
         assert!(change <= 1.0e-4, "{change}");
         assert!(level.iter().any(|v| *v > 0.4 && *v < 0.6));
     }
+}
+
+/// A7: light goes on evenly where the hard shadow of a cube ends. What is there to see of a jump is how the
+/// error changes from a pixel to the next: truth has none.
+#[test]
+fn nothing_jumps_where_the_hard_shadow_of_a_cube_ends() {
+    let _one = support::serial();
+    let cube = cuboid(Vec3::new(-0.7, 4.0, -0.5), Vec3::new(0.2, 4.9, 0.4));
+    let blockers = triangles(std::slice::from_ref(&cube));
+    let scene = scene(vec![floor(), cube], DISK);
+    let images = render(
+        &scene,
+        &[
+            "hard",
+            "dbuffer",
+            EDGES,
+            "dbuffer:buffer=edges,layers=4",
+            DISTANCES,
+        ],
+    );
+    let (light, places) = (scene.lights[0].light, places(DISK, 10_000));
+    let at = |i: u32| Vec3::new(floor_x(i % SIZE), 0.0, floor_x(i / SIZE));
+    let hard = &images[0];
+    let all = 0..SIZE * (SIZE - 1);
+    let pairs: Vec<[u32; 2]> = all
+        .flat_map(|i| [[i, i + 1], [i, i + SIZE]])
+        .filter(|[i, j]| i / SIZE == j / SIZE || i % SIZE == j % SIZE)
+        .filter(|[i, j]| hard[*i as usize] != hard[*j as usize])
+        .collect();
+    assert!(pairs.len() > 40);
+    let mut most = [0.0_f32; 5];
+    for pair in pairs {
+        let real = pair.map(|i| {
+            truth(at(i), &light, &places, |p, way| {
+                meets_triangles(&blockers, p, way)
+            })
+        });
+        for (most, image) in most.iter_mut().zip(&images) {
+            let off = [0, 1].map(|k| image[pair[k] as usize] - real[k]);
+            *most = most.max((off[0] - off[1]).abs());
+        }
+    }
+    println!("jumps: {most:?}");
+    assert!(most[0] > 0.5, "{most:?}");
+    assert!(most[1] <= 0.01 + SAMPLED, "{most:?}");
 }
 
 /// Figures 1 and 7 of the paper: seen from its centre the light's silhouettes are those of the upper

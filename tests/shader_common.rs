@@ -1,4 +1,5 @@
-//! Functions of `glsl/common/` do the same as their Rust twins, and shared structs lie the same.
+//! Functions of `glsl/common/` do the same as their Rust twins, and shared structs lie the same; functions
+//! of techniques do what sampling says.
 
 mod support;
 
@@ -14,6 +15,17 @@ use support::{compile, destroy_clean, gpu, serial};
 
 /// Runs `body`, which makes `vec4 r` of `vec4 s`, once for each element, after `head`.
 fn map(head: &str, body: &str, push: &[u8], source: &[[f32; 4]]) -> Vec<[f32; 4]> {
+    map_for(head, body, push, source, Vec::new())
+}
+
+/// The same with values of specialization constants.
+fn map_for(
+    head: &str,
+    body: &str,
+    push: &[u8],
+    source: &[[f32; 4]],
+    constants: Vec<(u32, u32)>,
+) -> Vec<[f32; 4]> {
     let shader = compile(
         COMPUTE,
         &format!(
@@ -42,7 +54,11 @@ fn map(head: &str, body: &str, push: &[u8], source: &[[f32; 4]]) -> Vec<[f32; 4]
     let target = input.mapped_mut().unwrap();
     target.copy_from_slice(bytemuck::cast_slice(source));
     gpu.run(|gpu, cmd| -> Result<(), GpuError> {
-        let pipeline = gpu.compute_pipeline(&ComputePipelineDesc::new(shader))?;
+        let desc = ComputePipelineDesc {
+            constants: constants.clone(),
+            ..ComputePipelineDesc::new(shader)
+        };
+        let pipeline = gpu.compute_pipeline(&desc)?;
         let set = gpu.allocate_set(&pipeline)?;
         let buffers = [input.raw, output.raw].into_iter().zip(0..);
         let writes = buffers.map(|(buffer, binding)| SetWrite {
@@ -295,4 +311,95 @@ fn irradiance_is_the_same_in_both_languages() {
             );
         },
     );
+}
+
+/// A5 of `dbuffer`: a face is a silhouette face if 720 points of the light's rim are not all on one side
+/// of its plane. Random faces, and ones nearly level with the light.
+#[test]
+fn silhouette_faces_are_those_whose_plane_parts_the_rim() {
+    const POINTS: u32 = 720;
+    // What rounding may change, as a part of the lengths, and what lies between two points of the rim.
+    const ROUNDING: f32 = 4.0e-6;
+    const BETWEEN: f32 = 1.0e-5;
+    let _one = serial();
+    let mut state = 11u32;
+    let mut random = move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+    };
+    let mut faces: Vec<([Vec3; 3], Vec3, f32)> = Vec::new();
+    for i in 0..3000 {
+        let mut vector = || Vec3::new(random(), random(), random());
+        let (at, z) = (4.0 * vector(), vector().normalize());
+        let mut sides = [vector(), vector()];
+        if i % 3 == 0 {
+            // Level but for a little, so that only the rim's ends differ.
+            let tilt = if i % 2 == 0 { 1.0e-3 } else { 0.1 };
+            sides = sides.map(|side| side - z * (side.dot(z) * (1.0 - tilt)));
+        }
+        faces.push(([at, at + sides[0], at + sides[1]], z, 0.1 + random().abs()));
+    }
+    let source: Vec<[f32; 4]> = faces
+        .iter()
+        .flat_map(|([a, b, c], z, radius)| {
+            let texel = |v: &Vec3, w: f32| v.extend(w).to_array();
+            [
+                texel(a, *radius),
+                texel(b, 0.0),
+                texel(c, 0.0),
+                texel(z, 0.0),
+            ]
+        })
+        .collect();
+    let head = "#include \"dbuffer/volumes.glsl\"";
+    let body = "uint i = gl_WorkGroupID.x / 4u * 4u;
+        r = vec4(is_silhouette_face(source[i].xyz, source[i + 1u].xyz, source[i + 2u].xyz,
+            source[i + 3u].xyz, source[i].w) ? 1.0 : 0.0);";
+    let shapes = [
+        LightShape::Disk { radius: 1.0 },
+        LightShape::Sphere { radius: 1.0 },
+        LightShape::Sun {
+            angular_diameter: 1.0,
+        },
+    ];
+    for shape in shapes {
+        let constants = vec![(0, shape_number(&shape))];
+        let results = map_for(head, body, &[], &source, constants);
+        let (mut counts, mut undecided) = ([0; 3], 0);
+        for (result, ([a, b, c], z, radius)) in results.chunks_exact(4).zip(&faces) {
+            let n = (*b - *a).cross(*c - *a);
+            let (x, y) = match shape {
+                // The great circle through what of a sphere is nearest to the plane.
+                LightShape::Sphere { .. } => {
+                    (n.normalize(), n.normalize().any_orthonormal_vector())
+                }
+                _ => z.any_orthonormal_pair(),
+            };
+            // Of a sun, directions to its rim.
+            let start = if shape.is_sun() { -*z } else { -*a };
+            let heights = (0..POINTS).map(|i| {
+                let (sine, cosine) = (std::f32::consts::TAU * i as f32 / POINTS as f32).sin_cos();
+                n.dot(start + (x * cosine + y * sine) * *radius)
+            });
+            let (low, high) = heights.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| {
+                (l.min(v), h.max(v))
+            });
+            let class = if low > 0.0 {
+                0
+            } else if high < 0.0 {
+                1
+            } else {
+                2
+            };
+            let slack = ROUNDING * n.length() * (start.length() + radius) + BETWEEN * (high - low);
+            if low.abs().min(high.abs()) <= slack {
+                undecided += 1;
+                continue;
+            }
+            counts[class] += 1;
+            assert_eq!(result[0] != [0.0; 4], class == 2, "{shape:?}: {a} {b} {c}");
+        }
+        assert!(undecided < 30, "{shape:?}: {undecided} too near to tell");
+        assert!(counts.iter().all(|count| *count > 200), "{counts:?}");
+    }
 }

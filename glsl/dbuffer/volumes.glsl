@@ -32,4 +32,13 @@ vec3 way_from(vec2 p, vec3 a) {
     return SUN ? vec3(-p, 1.0) : a - vec3(p, 0.0);
 }
 
+// Whether some of the light is on either side of a face's plane: neither all of it sees its front nor all
+// of it its back. Corners from the light's centre; z: unit vector along the light's direction, of a sphere
+// any; radius as in BufferParams. Published with points of the disk (section 3.1), needs none.
+bool is_silhouette_face(vec3 a, vec3 b, vec3 c, vec3 z, float radius) {
+    vec3 n = cross(b - a, c - a);
+    float height = SUN ? -dot(n, z) : -dot(n, a);
+    return abs(height) < radius * (LIGHT_SHAPE == LIGHT_SPHERE ? length(n) : length(cross(n, z)));
+}
+
 #endif

@@ -117,12 +117,6 @@ float texel_at(vec3 end) {
     return SUN ? texel : texel * end.z;
 }
 
-bool is_silhouette_face(vec3 a, vec3 b, vec3 c, vec3 z) {
-    vec3 n = cross(b - a, c - a);
-    float height = SUN ? -dot(n, params.axis_z.xyz) : -dot(n, a);
-    return abs(height) < params.center.w * (LIGHT_SHAPE == LIGHT_SPHERE ? length(n) : length(cross(n, z)));
-}
-
 void main() {
     const vec2 CORNERS[6] = vec2[](vec2(0.0), vec2(1.0, 0.0), vec2(1.0), vec2(0.0), vec2(1.0), vec2(0.0, 1.0));
     uint vertex = uint(gl_VertexIndex) % VERTICES;
@@ -145,7 +139,7 @@ void main() {
             return;
         }
         vec3 world_c = fetch_point(corner).xyz - origin;
-        if (is_silhouette_face(world_a, world_b, world_c, forward)) {
+        if (is_silhouette_face(world_a, world_b, world_c, forward, params.center.w)) {
             first = world_a;
             second = world_b;
             third = world_c;

@@ -225,6 +225,38 @@ fn nothing_is_full_light_and_a_cover_is_none() {
 
 /// Kernels that reached out of the image would let light in around a cover that ends where the
 /// image does.
+/// Ground and a sheet that stands on it: neither has anything between itself and the light, which
+/// shines past the upright sheet's plane in part.
+#[test]
+fn without_casters_there_are_no_slices() {
+    let _one = support::serial();
+    let sheet = [
+        Vec3::new(-0.2, 0.0, -0.5),
+        Vec3::new(-0.2, 0.0, 0.5),
+        Vec3::new(0.2, 0.4, 0.5),
+        Vec3::new(0.2, 0.4, -0.5),
+    ];
+    let ground = scene(vec![floor()], square(1.0));
+    let with_sheet = scene(vec![floor(), quad("sheet", sheet)], square(1.0));
+    for (scene, slices) in [(&ground, false), (&with_sheet, true)] {
+        let mut renderer = FrameRenderer::new(support::gpu(), scene).unwrap();
+        let mut request = request(&camera(), [SIZE; 2], "");
+        let frame = renderer.render(&request).unwrap();
+        let passes = frame.passes.iter().map(|(name, _)| name.as_str());
+        let sliced = passes.filter(|name| name.contains("slices")).count();
+        assert_eq!(sliced > 0, slices);
+        request.technique = "shaft-masks".parse().unwrap();
+        let exact = renderer.render(&request).unwrap();
+        let pairs = frame.lights[0]
+            .visibility
+            .iter()
+            .zip(&exact.lights[0].visibility);
+        let most = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(slices || most == 0.0, "{most}");
+        support::assert_no_messages(&renderer.destroy().unwrap());
+    }
+}
+
 #[test]
 fn kernels_stay_within_the_image() {
     let _one = support::serial();

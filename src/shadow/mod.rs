@@ -15,6 +15,7 @@ pub mod shaft_masks;
 pub mod silhouettes;
 pub mod ssoc;
 mod technique;
+mod unblocked;
 mod uniform;
 
 pub use casters::{can_block, casters};

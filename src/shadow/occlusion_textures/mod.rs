@@ -22,6 +22,7 @@
 //! | `rows`, `columns` | summed-area tables of that |
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
+//! | `unblocked` | visibility, instead of all others, where nothing can block the light |
 
 mod between;
 mod options;
@@ -34,10 +35,10 @@ use between::Casters;
 pub use options::{Combine, Filter, Fit, OcclusionOptions, Planes, Projection};
 
 use super::receivers::add_receivers;
+use super::unblocked::add_unblocked;
 use super::{ShadowInputs, ShadowMask};
-use crate::graph::{Graph, ImageDesc, PassKind};
+use crate::graph::Graph;
 use crate::light::ShapeKind;
-use ash::vk;
 
 /// The technique's name.
 pub(super) const NAME: &str = "occlusion-textures";
@@ -62,6 +63,9 @@ pub(super) fn add_passes<'f>(
         blocks: &inputs.casters,
     };
     let views = views::sliced_views(&inputs.light, &inputs.receivers, &casters, &options);
+    if views.is_empty() {
+        return ShadowMask::new(add_unblocked(graph, inputs, NAME));
+    }
     let sliced: Vec<_> = views
         .into_iter()
         .enumerate()
@@ -83,21 +87,5 @@ pub(super) fn add_passes<'f>(
             index,
         );
     }
-    if sliced.is_empty() {
-        // Nothing in the picture: the tiles are all settled, or there is nothing to cast.
-        return ShadowMask::new(settled(graph, inputs));
-    }
     ShadowMask::new(mask)
-}
-
-/// An image of full visibility.
-fn settled(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> crate::graph::ImageId {
-    let [width, height] = inputs.camera.size();
-    let name = &inputs.light_name;
-    let desc = ImageDesc::new(vk::Format::R32_SFLOAT, width, height);
-    let image = graph.create_image(format!("visibility {name}"), desc);
-    let mut pass = graph.pass(format!("{NAME}.visibility {name}"), PassKind::Transfer);
-    let image = pass.overwrite(image, crate::graph::Access::Clear);
-    pass.record(move |ctx| ctx.clear_image(image, [1.0; 4]));
-    image
 }

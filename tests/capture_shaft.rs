@@ -4,12 +4,13 @@
 mod support;
 
 use antumbra::capture::{CapturedImage, FrameRenderer, FrameRequest, Samples};
-use antumbra::light::AreaLight;
+use antumbra::light::{AreaLight, LightShape};
 use antumbra::reference::{Pattern, Reference, Sampling, Settings, Surface};
 use antumbra::scene::{LoadOptions, Scene, SceneCamera};
 use antumbra::shadow::shaft_masks::light_samples;
 use glam::{DVec3, UVec2};
 use std::path::Path;
+use support::plates::{self, HEIGHT, floor, floor_x, plate};
 
 const SIZE: [u32; 2] = [64; 2];
 
@@ -272,4 +273,82 @@ fn errors_are_within_their_bounds() {
         );
     }
     support::assert_no_messages(&renderer.destroy().unwrap());
+}
+
+/// The part of a unit disk left of x.
+fn disk_left_of(x: f64) -> f64 {
+    let x = x.clamp(-1.0, 1.0);
+    0.5 + (x * (1.0 - x * x).sqrt() + x.asin()) / std::f64::consts::PI
+}
+
+/// Half-planes, a slot between two and both with a plate before them, under a square and a disk: the
+/// part of the light that is seen is known, and no pixel is farther from it than its bound.
+#[test]
+fn no_bound_is_exceeded_on_closed_forms() {
+    let _one = support::serial();
+    let wide = [-30.0, 30.0];
+    let half_plane = vec![floor(), plate("half-plane", [-30.0, 0.0], wide, 5.0)];
+    let mut slot = half_plane.clone();
+    slot.push(plate("other", [0.3, 30.0], wide, 5.0));
+    let mut overlapping = half_plane.clone();
+    overlapping.push(plate("nearer", [-30.0, -0.1], wide, 3.0));
+    let square = LightShape::Rect {
+        width: 2.0,
+        height: 2.0,
+    };
+    let disk = LightShape::Disk { radius: 1.0 };
+    // What each plate leaves of the light, as the range of its places -1 to 1 seen from x on the floor.
+    let place = |edge: f64, depth: f64, x: f64| {
+        let height = f64::from(HEIGHT);
+        (edge * height - x * depth) / (height - depth)
+    };
+    let beyond = |x: f64| [place(0.0, 5.0, x), 1.0];
+    let between = |x: f64| [place(0.0, 5.0, x), place(f64::from(0.3f32), 5.0, x)];
+    let both = |x: f64| {
+        [
+            place(0.0, 5.0, x).max(place(f64::from(-0.1f32), 3.0, x)),
+            1.0,
+        ]
+    };
+    type Free<'a> = &'a dyn Fn(f64) -> [f64; 2];
+    let cases: [(&str, Vec<_>, Free); 3] = [
+        ("half-plane", half_plane, &beyond),
+        ("slot", slot, &between),
+        ("overlap", overlapping, &both),
+    ];
+    let mut renderer: Option<FrameRenderer<'static>> = None;
+    for (name, primitives, free) in cases {
+        for shape in [square, disk] {
+            let scene = plates::scene(primitives.clone(), shape);
+            let renderer = match &mut renderer {
+                Some(renderer) => {
+                    renderer.set_scene(scene).unwrap();
+                    renderer
+                }
+                none => none.insert(FrameRenderer::owning(support::gpu(), scene).unwrap()),
+            };
+            for technique in ["shaft-masks", "shaft-masks:target-error=none"] {
+                let (seen, bound) = bounded(renderer, &plates::camera(), 0, technique);
+                let (mut worst, mut partly) = (0.0f64, 0);
+                for (i, (seen, bound)) in seen.iter().zip(&bound).enumerate() {
+                    let [from, to] = free(f64::from(floor_x(i as u32 % SIZE[0])));
+                    let part = |x: f64| match shape {
+                        LightShape::Disk { .. } => disk_left_of(x),
+                        _ => 0.5 + 0.5 * x.clamp(-1.0, 1.0),
+                    };
+                    let truth = (part(to) - part(from)).max(0.0);
+                    let off = (f64::from(*seen) - truth).abs();
+                    worst = worst.max(off);
+                    partly += usize::from(truth > 0.01 && truth < 0.99);
+                    assert!(
+                        off <= f64::from(*bound) + 1.0e-5,
+                        "{name}, {shape:?}, {technique}, pixel {i}: {off} off, bound {bound}"
+                    );
+                }
+                println!("{name}, {shape:?}, {technique}: {worst:.4} off at most, {partly} pixels");
+                assert!(partly > 500);
+            }
+        }
+    }
+    support::assert_no_messages(&renderer.unwrap().destroy().unwrap());
 }

@@ -46,7 +46,7 @@ pub fn limits(technique: Technique) -> Limits {
         // taps fall on other texels once the map is fitted anew (boxes lie along the axes, so a turn
         // changes the fit): an edge is up to 0.71 texels off in either map, 1.42 of the 5 that the
         // filter is wide, at the slope of a disk's area, 4 / pi: 0.36. With the fit fixed a texel can
-        // only get nearer to the light.
+        // only get nearer to the light. Rounding may decide a tap: one, of one of 1269 pixels.
         "pcf" => Limits {
             step: 1.0 / 32.0,
             fine: 0.06,
@@ -56,7 +56,7 @@ pub fn limits(technique: Technique) -> Limits {
             brighter: 0.0,
             jumps: 0.005,
             jump: 0.25,
-            flips: MAY_FLIP,
+            flips: 0.001,
         },
         // As pcf where the filter is narrow. The area searched for blockers follows boxes along the
         // axes, so a turn changes what is found: a fault of the method, measured as 0.35 and, of the
@@ -94,8 +94,8 @@ pub fn limits(technique: Technique) -> Limits {
         // views, and the rest is where texels and slices fall on edges; most under a light that its
         // blockers touch, where kernels are larger than the view (`grazing`: 0.046, and 0.014 of the
         // picture). Beside the walls of a room the slice that holds them cannot tell them from blockers.
-        // A bit that rounding sets changes what its kernels find: up to 17 of 4096 pixels, by up to
-        // 0.0044.
+        // A bit that rounding sets changes what its kernels find: up to 28 of 4096 pixels, by up to
+        // 0.007.
         "occlusion-textures" => Limits {
             step: 1.0 / 32.0,
             fine: 0.001,
@@ -105,7 +105,7 @@ pub fn limits(technique: Technique) -> Limits {
             brighter: 0.0005,
             jumps: 0.001,
             jump: 0.25,
-            flips: 0.005,
+            flips: 0.007,
         },
         // No map but that of the light's centre decides anything, and edges are where triangles have them,
         // whatever the guise; that map misses what is smaller than a texel where no edge is before the

@@ -86,6 +86,8 @@ fn closed_forms() {
     c5_a_tilted_sheet_does_not_leak(&mut rig);
     c6_frames_repeat_to_the_bit(&mut rig);
     lists_without_room_leave_the_masks(&mut rig);
+    work_is_left_out_and_counted(&mut rig);
+    memory_is_that_of_the_formula(&mut rig);
     random_rays_are_right_on_average(&mut rig);
     uneven_lights_are_weighed(&mut rig);
     pixels_can_be_antialiased(&mut rig);
@@ -245,6 +247,57 @@ fn lists_without_room_leave_the_masks(rig: &mut Rig) {
     );
     assert!(images[0].contains(&0.0) && images[0].contains(&1.0));
     assert!(images[0] == images[1]);
+}
+
+/// What no ray is blocked at is ruled out before any is traced: the picture is the same, pixels that see
+/// all of the light trace none, a light without size gets one ray, and lists hold what was counted.
+fn work_is_left_out_and_counted(rig: &mut Rig) {
+    let bar = plate("bar", [-0.3, 0.3], [-0.3, 0.3], 5.0);
+    let mut both = scene(vec![floor(), bar], square(1.0));
+    for shape in [square(0.3), LightShape::Point] {
+        both.lights[0].light.shape = shape;
+        rig.0.set_scene(both.clone()).unwrap();
+        let [early, late] = ["on", "off"].map(|early| {
+            let technique = format!("mdi:resolution=512,early={early}");
+            let frame = rig.0.render_counted(&request(&camera(), SIZE, &technique));
+            frame.unwrap().lights.remove(0)
+        });
+        assert!(early.visibility == late.visibility);
+        let counts = [&early, &late].map(|light| light.counters["pixels_traced"]);
+        let unlit = early.visibility.iter().filter(|v| **v < 1.0).count() as u64;
+        println!("early: {counts:?} of {} pixels, {unlit} unlit", SIZE * SIZE);
+        assert_eq!(counts[1], u64::from(SIZE * SIZE));
+        assert!(unlit > 100 && (unlit..2 * unlit).contains(&counts[0]));
+        let depths = early.counters["depths"];
+        assert_eq!(early.counters["depths_listed"], depths);
+        // The floor fills the view but for its margin, and nothing else does.
+        assert!((240_000..330_000).contains(&depths), "{depths}");
+        if shape == LightShape::Point {
+            assert!(early.visibility.iter().all(|v| *v == 0.0 || *v == 1.0));
+        }
+    }
+}
+
+/// P Q (R + 8) + 4 S bytes for P Q texels, masks of R bytes and S depths: here with room for a number of
+/// depths a texel, the masks' coarser levels, and a count for each texel.
+fn memory_is_that_of_the_formula(rig: &mut Rig) {
+    let bar = plate("bar", [-0.3, 0.3], [-0.3, 0.3], 5.0);
+    rig.0
+        .set_scene(scene(vec![floor(), bar], square(0.3)))
+        .unwrap();
+    for (buckets, depths) in [(32, 4), (64, 4), (128, 4), (64, 8)] {
+        let bytes = [512_u32, 1024].map(|side| {
+            let technique = format!("mdi:resolution={side},buckets={buckets},depths={depths}");
+            let frame = rig.0.render(&request(&camera(), SIZE, &technique)).unwrap();
+            frame.counters["transient_bytes"] as f64
+        });
+        let texels = f64::from(1024 * 1024 - 512 * 512);
+        let mask = f64::from(buckets) / 8.0 * 4.0 / 3.0;
+        let wanted = texels * (mask + 8.0 + 4.0 * f64::from(depths) + 4.0);
+        let ratio = (bytes[1] - bytes[0]) / wanted;
+        println!("{buckets} buckets, {depths} depths: {bytes:?} bytes, {ratio:.3} of the formula");
+        assert!((0.9..1.05).contains(&ratio), "{ratio}");
+    }
 }
 
 /// The paper's figure 7: places of its own for each pixel instead of a fan.

@@ -13,6 +13,8 @@ layout(set = 0, binding = 1) uniform usampler2DArray counts;
 layout(set = 0, binding = 2) uniform usampler2D sums;
 layout(set = 0, binding = 3, rg32ui) uniform writeonly uimage2DArray heads;
 
+layout(set = 0, binding = 4, r32ui) uniform uimage2D tally;
+
 const uint NO_LIST = 0xFFFFFFFFu;
 
 shared uint before[gl_WorkGroupSize.x]; // parts of the sum of all rows before this group's
@@ -35,11 +37,17 @@ void main() {
     for (int i = 0; i < int(gl_WorkGroupSize.x); ++i) {
         begin += before[i] + (i < lane ? rows[i] : 0u);
     }
+    uint listed = 0u;
     for (int x = 0; x < size.x && row < size.y; ++x) {
         uint count = texelFetch(counts, ivec3(x, row, view), 0).x;
         bool fits = begin + count <= params.counts.z;
         uvec2 head = fits ? uvec2(begin, count) : uvec2(NO_LIST, 0u);
         imageStore(heads, ivec3(x, row, view), uvec4(head, 0u, 0u));
         begin += count;
+        listed = fits ? begin : listed;
+    }
+    if (row < size.y) {
+        imageAtomicMax(tally, ivec2(0, 0), listed);
+        imageAtomicMax(tally, ivec2(1, 0), begin);
     }
 }

@@ -15,11 +15,14 @@ const uint RANDOM_PLACES = 1u;
 const uint PIXEL_FOOTPRINT = 2u;
 const uint DITHERED_TEXELS = 4u;
 const uint UNEVEN_LIGHT = 8u;
+const uint ALL_BOUNDARIES = 16u;
+const uint TESTED_SIDES = 32u;
 
 struct MdiParams {
     uvec4 counts;  // views, texels across and down a view, depths that lists have room for, triangles
     uvec4 options; // buckets, 1 where surfaces mark the nearest boundary and 0 both of a bucket, rays,
-                   // RANDOM_PLACES | PIXEL_FOOTPRINT | DITHERED_TEXELS | UNEVEN_LIGHT
+                   // RANDOM_PLACES | PIXEL_FOOTPRINT | DITHERED_TEXELS | UNEVEN_LIGHT |
+                   // ALL_BOUNDARIES | TESTED_SIDES
     vec4 origin;   // xyz: what views are relative to: the light, of a sun the origin of scene space
     LightView views[MAX_LIGHT_VIEWS];
     vec4 places[MAX_LIGHT_VIEWS];  // place = (x + y s) / (z + w s): bucket k is from k to k + 1

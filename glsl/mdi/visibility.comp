@@ -38,12 +38,14 @@ layout(set = 0, binding = 10, std140) uniform RayBlock {
     vec4 rays[MAX_RAYS]; // xy: place on the light, -1 to 1 along its axes; z: weight, all sum to 1
 };
 
+layout(set = 0, binding = 11, r32ui) uniform uimage2D tally; // from row 1 on: pixels traced in each tile
+
 // Rounding of depths and places, as a part of them: 16 units of single precision's last place.
 const float ROUNDING = 1.0 / 1048576.0;
 
 // What a view reaches beyond its face of the cube at most: distance by depth at a corner, with a margin
-// of 0.5.
-const float FARTHEST_BY_DEPTH = 2.35;
+// of 1.
+const float FARTHEST_BY_DEPTH = 3.01;
 
 // Texels across and down that are looked at one by one, for all rays at once.
 const int MOST_ALIKE = 3;
@@ -192,15 +194,20 @@ bool is_blocked(Fan fan, ivec2 texel, int k) {
     return blocked;
 }
 
-// Where a boundary is, or the receiver if that is nearer.
-float boundary_s(Fan fan, int k) {
-    return max(s_of(fan.places, float(k)), fan.s);
+// Where a boundary is, or a place so many buckets beyond it, or the receiver if that is nearer.
+float boundary_s(Fan fan, int k, float beyond) {
+    return max(s_of(fan.places, float(k) + beyond), fan.s);
+}
+
+// How far before and behind a boundary rays are tested, buckets.
+float side_of() {
+    return (params.options.w & TESTED_SIDES) != 0u ? 0.5 : 0.0;
 }
 
 // Texels that rays look up between two boundaries: x, y of the first, x, y of the last.
 ivec4 texels_between(Fan fan, int first, int last) {
-    float near = boundary_s(fan, first) - fan.s;
-    float far = boundary_s(fan, last) - fan.s;
+    float near = boundary_s(fan, first, -side_of()) - fan.s;
+    float far = boundary_s(fan, last, side_of()) - fan.s;
     vec2 aside = (abs(fan.spread[0]) + abs(fan.spread[1])) * (1.0 + fan.growth * near);
     aside += (params.options.w & DITHERED_TEXELS) != 0u ? 0.5 : 0.0;
     vec2 low = fan.start + min(fan.low * near, fan.low * far) - aside;
@@ -275,10 +282,11 @@ uvec4 up_to(int k) {
     return mix(part, uvec4(0xFFFFFFFFu), equal(count, ivec4(32)));
 }
 
-// Whether a ray passes all boundaries. `own`: in the receiver's view; else what of the ray lies in
+// Whether a ray passes all boundaries, each so many buckets beyond it. `own`: in the receiver's view; else what of the ray lies in
 // another one is looked at. level: of the cells of the pyramid to begin with; where a ray ended is a
 // fair guess for the next one.
-bool passes(Fan fan, bool own, uint index, vec2 place, uvec4 left, uvec4 clear, inout int level) {
+bool passes(Fan fan, bool own, uint index, vec2 place, uvec4 left, uvec4 clear, float beyond,
+    inout int level) {
     vec4 course = fan.middle + place.x * fan.along_x + place.y * fan.along_y;
     float size = float(params.counts.y);
     int top = textureQueryLevels(boundaries) - 1;
@@ -315,13 +323,13 @@ bool passes(Fan fan, bool own, uint index, vec2 place, uvec4 left, uvec4 clear, 
         ivec2 cell = ivec2(0);
         int k = highest(left);
         while (!found && left != uvec4(0u) && k >= least) {
-            float s = own ? boundary_s(fan, k) : s_of(fan.places, float(k));
+            float s = own ? boundary_s(fan, k, beyond) : s_of(fan.places, float(k) + beyond);
             vec2 at = floor(start + slope * (s - fan.s));
             bool inside = all(equal(at, clamp(at, 0.0, size - 1.0)));
             cell = ivec2(at) >> level;
             vec2 edge = vec2((cell + ivec2(greaterThan(across, vec2(0.0)))) << level);
             vec2 leaves = (edge - start) * across;
-            float last = ceil(place_of(fan.places, fan.s + min(leaves.x, leaves.y)));
+            float last = ceil(place_of(fan.places, fan.s + min(leaves.x, leaves.y)) - beyond);
             int word = k >> 5;
             int lowest = int(clamp(last - float(32 * word), 0.0, float(k & 31)));
             uint bits = left[word];
@@ -386,10 +394,13 @@ Fan fan_in(uint index, vec3 q, vec3 n, PlacedLight placed) {
 }
 
 // The part of the light that is seen, of that above the receiver's plane; of an uneven light, of all.
-float traced(Fan fan, vec3 q, vec3 n, PlacedLight placed) {
-    uvec4 clear;
-    uvec4 marks = reached(fan, clear);
-    marks = (marks & clear) | not_free(fan, marks & ~clear);
+float traced(Fan fan, vec3 q, vec3 n, PlacedLight placed, ivec2 tile) {
+    uvec4 clear = uvec4(0u);
+    uvec4 marks = up_to(fan.own);
+    if ((params.options.w & ALL_BOUNDARIES) == 0u) {
+        marks = reached(fan, clear);
+        marks = (marks & clear) | not_free(fan, marks & ~clear);
+    }
     uint others = 0u;
     float nearest = 0.0; // s of what is nearest to the light in another view
     for (uint i = 0u; i < params.counts.x; ++i) {
@@ -405,6 +416,7 @@ float traced(Fan fan, vec3 q, vec3 n, PlacedLight placed) {
     if (marks == uvec4(0u) && others == 0u && !uneven) {
         return 1.0;
     }
+    imageAtomicAdd(tally, tile + ivec2(0, 1), 1u);
     float seen = 0.0;
     float above = 0.0;
     int level = 0;
@@ -436,7 +448,12 @@ float traced(Fan fan, vec3 q, vec3 n, PlacedLight placed) {
                 uint bit = waiting & (~waiting + 1u);
                 waiting ^= bit;
                 uint i = first + uint(findLSB(bit));
-                bool passed = passes(turn, own, i, ray_of(fan, i).xy, left, known, level);
+                vec2 place = ray_of(fan, i).xy;
+                float side = side_of();
+                bool passed = true;
+                for (float beyond = -side; passed && beyond <= side; beyond += 0.5) {
+                    passed = passes(turn, own, i, place, left, known, beyond, level);
+                }
                 open = passed ? open : open ^ bit;
             }
             more = views != 0u && (open & leaving) != 0u;
@@ -520,7 +537,7 @@ float pixel_visibility(uvec2 pixel) {
                 fan.spread = mat2(spread[0] * texels, spread[1] * texels);
             }
             bool uneven = (params.options.w & UNEVEN_LIGHT) != 0u;
-            result = (uneven ? 1.0 : above) * traced(fan, q, n, placed);
+            result = (uneven ? 1.0 : above) * traced(fan, q, n, placed, ivec2(pixel / TILE_SIZE));
         }
     }
     return result;

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use antumbra::light::{DEFAULT_SUN_ANGLE, IntensityUnit, LightShape, SpotCone};
 use glam::Vec3;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::*;
 
@@ -52,6 +52,30 @@ fn extras_give_the_shape_in_world_metres() -> Result {
             };
             assert_eq!(light.spot, (kind == "spot").then_some(cone));
         }
+    }
+    Ok(())
+}
+
+#[test]
+fn extras_say_how_bright_parts_of_a_rect_are() -> Result {
+    let of = |weights: Value| {
+        let extras = json!({"shape": "rect", "width": 2, "height": 1, "weights": weights});
+        lit(json!({"type": "point", "extras": extras}), json!({}))
+    };
+    let light = load(&of(json!([[2, 0, 0], [0, 0, 1]])))?.lights[0].light;
+    assert_eq!(light.weights.columns(), 3);
+    assert_eq!(light.weights.values(), [1.0, 0.0, 0.0, 0.0, 0.0, 0.5]);
+    assert!(light.is_uneven());
+    for bad in [
+        json!([[0, 0]]),
+        json!([[1, -1]]),
+        json!([[1, 2], [1]]),
+        json!([]),
+        json!([[]]),
+        json!("grey.png"),
+    ] {
+        let message = message(&of(bad));
+        assert!(message.contains("`weights` of its light is"), "{message}");
     }
     Ok(())
 }

@@ -4,6 +4,7 @@ use super::coverage::Coverage;
 use super::options::MdiOptions;
 use super::views::MdiViews;
 use super::{NAME, ShadowInputs};
+use crate::geometry::tile_counts;
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
     Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, ImagePart, PassKind, Stage,
@@ -26,7 +27,16 @@ pub(super) struct Layers {
     pub heads: ImageId,
     /// R32_UINT: depths, as bits of floats.
     pub lists: ImageId,
+    /// R32_UINT: how many depths lists had room for, how many there are, and from the second row on, for
+    /// each tile of the picture, pixels that rays were traced from, none yet.
+    pub tally: ImageId,
 }
+
+/// Rows of the image of lists: devices allow no more.
+const MOST_ROWS: u32 = 16_384;
+
+/// Most depths that lists can have room for.
+pub(super) const MOST_DEPTHS: u32 = MOST_ROWS * LIST_WIDTH;
 
 pub(super) fn add_layers<'f>(
     graph: &mut Graph<'f>,
@@ -53,18 +63,23 @@ pub(super) fn add_layers<'f>(
         base_layer: 0,
         layers: count * words,
     };
+    let [across, down] = tile_counts(inputs.camera.size());
+    let desc = ImageDesc::new(vk::Format::R32_UINT, across.max(2), down + 1);
+    let tally = graph.create_image(format!("{NAME}.tally {name}"), desc);
     let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
     let mut counts = pass.overwrite(counts, Access::Clear);
     let mut boundaries = pass.overwrite_part(boundaries, level(0), Access::Clear);
+    let tally = pass.overwrite(tally, Access::Clear);
     pass.record(move |ctx| {
         ctx.clear_image(counts, [0.0; 4])?;
+        ctx.clear_image(tally, [0.0; 4])?;
         ctx.clear_image(boundaries, [0.0; 4])
     });
     let mut coverage = Coverage::new(inputs, params, side, level(0));
     for view in 0..views.count {
         [counts, boundaries] = coverage.add_count(graph, inputs, view, [counts, boundaries]);
     }
-    let heads = add_heads(graph, name, params, counts, side, count);
+    let (heads, tally) = add_heads(graph, name, params, [counts, tally], [side, count]);
     let rows = (views.capacity.div_ceil(LIST_WIDTH)).max(1);
     let lists = graph.create_image(
         format!("{NAME}.lists {name}"),
@@ -96,6 +111,7 @@ pub(super) fn add_layers<'f>(
         boundaries,
         heads,
         lists,
+        tally,
     }
 }
 
@@ -119,10 +135,9 @@ fn add_heads(
     graph: &mut Graph<'_>,
     name: &str,
     params: BufferId,
-    counts: ImageId,
-    side: u32,
-    count: u32,
-) -> ImageId {
+    [counts, tally]: [ImageId; 2],
+    [side, count]: [u32; 2],
+) -> (ImageId, ImageId) {
     let desc = ImageDesc::new(vk::Format::R32_UINT, side, count);
     let sums = graph.create_image(format!("{NAME}.sums {name}"), desc);
     let mut pass = graph.pass(format!("{NAME}.rows {name}"), PassKind::Compute);
@@ -145,6 +160,7 @@ fn add_heads(
     pass.read(counts, Access::Sampled(Stage::Compute));
     pass.read(sums, Access::Sampled(Stage::Compute));
     let heads = pass.overwrite(heads, Access::StorageWrite(Stage::Compute));
+    let tally = pass.write(tally, Access::StorageReadWrite(Stage::Compute));
     pass.record(move |ctx| {
         let shader = &spirv::MDI_HEADS_COMP;
         let nearest = SamplerDesc::nearest();
@@ -153,12 +169,13 @@ fn add_heads(
             Bind::sampled(1, counts, nearest).array(),
             Bind::sampled(2, sums, nearest),
             Bind::storage_image(3, heads).array(),
+            Bind::storage_image(4, tally),
         ];
         ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
         ctx.dispatch(shader.groups([side, count, 1]));
         Ok(())
     });
-    heads
+    (heads, tally)
 }
 
 /// The coarser levels, each the OR of 2x2 texels of the one below. `part`: a level, all layers.

@@ -33,7 +33,7 @@ mod views;
 pub use options::{Buckets, Footprint, MdiOptions};
 
 use super::receivers::add_receivers;
-use super::{ShadowInputs, ShadowMask, shape_number};
+use super::{ShadowInputs, ShadowMask, Tally, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, Graph, PassKind, Stage};
 use layers::Layers;
@@ -47,14 +47,16 @@ pub(super) fn add_passes<'f>(
     inputs: &ShadowInputs<'f>,
     options: MdiOptions,
 ) -> ShadowMask {
-    let boxes: Vec<_> = (inputs.scene.draws().iter().map(|draw| draw.bounds)).collect();
+    // Boxes that turn with the triangles grow less around what is turned.
+    let boxes: Vec<_> = (inputs.scene.draws().iter().map(|draw| draw.corners)).collect();
+    let size = inputs.camera.size();
     let triangles = inputs.scene.triangle_count() as u32;
     let views = views::mdi_views(
         &inputs.light,
         &inputs.receivers,
         &boxes,
         triangles,
-        (&options, options.side(inputs.camera.size())),
+        (&options, size),
     );
     let layers = layers::add_layers(graph, inputs, &options, &views);
     add_visibility(graph, inputs, &layers)
@@ -87,6 +89,7 @@ fn add_visibility<'f>(
     }
     list.read(&mut pass);
     let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
+    let tally = pass.write(layers.tally, Access::StorageReadWrite(Stage::Compute));
     let constants = vec![(0, shape_number(&light.shape))];
     pass.record(move |ctx| {
         let nearest = SamplerDesc::nearest();
@@ -102,6 +105,7 @@ fn add_visibility<'f>(
             Bind::uniform(8, list.arguments),
             Bind::sampled(9, list.tiles, nearest),
             Bind::uniform(10, layers.rays),
+            Bind::storage_image(11, tally),
         ];
         let pipeline = ComputePipelineDesc {
             constants,
@@ -110,5 +114,21 @@ fn add_visibility<'f>(
         ctx.bind_compute(&pipeline, &bindings, &[])?;
         list.dispatch(ctx)
     });
-    ShadowMask::new(visibility)
+    ShadowMask {
+        tally: Some(Tally {
+            image: tally,
+            count,
+        }),
+        ..ShadowMask::new(visibility)
+    }
+}
+
+/// Pixels that rays were traced from; depths that are in the way of light, and that lists had room for.
+fn count(texels: &[u32]) -> Vec<(&'static str, u64)> {
+    let counts: Vec<u64> = texels.iter().copied().map(u64::from).collect();
+    vec![
+        ("pixels_traced", counts[2..].iter().sum()),
+        ("depths_listed", counts[0]),
+        ("depths", counts[1]),
+    ]
 }

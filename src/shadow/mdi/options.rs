@@ -46,7 +46,24 @@ pub struct MdiOptions {
     pub dithered: bool,
     /// Depths that the lists have room for, per texel of all views on average, 1 to 64.
     pub depths: u32,
+    /// A ray is tested at a boundary in the texels half a bucket before and behind it too: the sides of
+    /// the buckets, without which it may slip between a surface's marks.
+    pub sides: bool,
+    /// What no ray of a pixel is blocked at is found for all of them at once, before any is traced:
+    /// the picture is the same without.
+    pub early: bool,
 }
+
+fn switch(value: &str) -> Option<bool> {
+    match value {
+        "on" => Some(true),
+        "off" => Some(false),
+        _ => None,
+    }
+}
+
+/// Texels across a usual penumbra below which finer ones are worth their time.
+const FEW_TEXELS: f64 = 6.0;
 
 impl MdiOptions {
     /// What the technique does without options.
@@ -59,7 +76,9 @@ impl MdiOptions {
         random: false,
         footprint: Footprint::Point,
         dithered: true,
-        depths: 8,
+        depths: 4,
+        sides: false,
+        early: true,
     };
 
     /// What can be set.
@@ -67,7 +86,7 @@ impl MdiOptions {
         TechniqueOption::new(
             "resolution",
             "auto",
-            "64 to 2048, a power of two, or auto (4 times the picture's longer side, 256 to 1024)",
+            "64 to 2048, a power of two, or auto (4 times the picture's longer side, 512 to 1024, twice that for a narrow light in one view)",
             "texels across and down each view's image",
         ),
         TechniqueOption::new("buckets", "64", "32, 64 or 128", "depth buckets"),
@@ -104,9 +123,21 @@ impl MdiOptions {
         ),
         TechniqueOption::new(
             "depths",
-            "8",
+            "4",
             "1 to 64",
             "depths that lists have room for, per texel on average",
+        ),
+        TechniqueOption::new(
+            "sides",
+            "off",
+            "off or on (half a bucket before and behind each boundary too, against leaks)",
+            "whether rays are tested at the sides of buckets",
+        ),
+        TechniqueOption::new(
+            "early",
+            "on",
+            "on or off",
+            "whether boundaries that block no ray of a pixel are ruled out before any is traced",
         ),
     ];
 
@@ -131,6 +162,8 @@ impl MdiOptions {
             .to_string(),
             if self.dithered { "dithered" } else { "nearest" }.to_string(),
             self.depths.to_string(),
+            if self.sides { "on" } else { "off" }.to_string(),
+            if self.early { "on" } else { "off" }.to_string(),
         ]
     }
 
@@ -182,15 +215,23 @@ impl MdiOptions {
                 }
             }
             "depths" => self.depths = number(1..=64)?,
+            "sides" => self.sides = switch(value)?,
+            "early" => self.early = switch(value)?,
             _ => return None,
         }
         Some(())
     }
 
-    /// Texels across and down each view's image, for a picture of a size.
-    pub(super) fn side(&self, [width, height]: [u32; 2]) -> u32 {
+    /// Texels across and down the image of each of some views, for a picture of a size. `across`: the
+    /// width of a usual penumbra as a part of the view's.
+    pub(super) fn side(&self, [width, height]: [u32; 2], views: u32, across: f64) -> u32 {
         let picture = width.max(height).saturating_mul(4).next_power_of_two();
-        self.resolution.unwrap_or(picture.clamp(256, 1024))
+        let side = picture.clamp(512, 1024);
+        let fitted = match views {
+            0 | 1 if across * f64::from(side) < FEW_TEXELS => 2 * side,
+            _ => side,
+        };
+        self.resolution.unwrap_or(fitted)
     }
 
     /// Words of a texel's mask.

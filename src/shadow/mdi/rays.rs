@@ -15,11 +15,11 @@ pub(super) fn ray_table(light: &AreaLight, count: u32) -> Vec<Ray> {
     (0..count)
         .map(|index| {
             let [x, y] = match light.shape {
-                LightShape::Point => [0.0, 0.0],
                 LightShape::Line { .. } => {
                     let part = (f64::from(index) + 0.5) / f64::from(count);
                     [2.0 * light.profile.place_of(part) - 1.0, 0.0]
                 }
+                LightShape::Point => square_place(index, count),
                 LightShape::Rect { .. } => {
                     let place = square_place(index, count).map(|v| 0.5 * v + 0.5);
                     light.weights.place_of(place).map(|v| 2.0 * v - 1.0)

@@ -1,12 +1,13 @@
 //! Views of a light and the depth range of their buckets.
 
+use super::layers::MOST_DEPTHS;
 use super::options::{Buckets, Footprint, MdiOptions};
 use super::rays::{MOST_RAYS, Ray, ray_table};
 use crate::light::AreaLight;
 use crate::scene::Aabb;
 use crate::shadow::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// `MdiParams` in `mdi/params.glsl`.
 #[repr(C)]
@@ -20,9 +21,9 @@ pub(super) struct MdiParams {
     nearest: [[f32; 4]; MAX_LIGHT_VIEWS],
 }
 
-/// Views reach at most this far beyond the receivers, as the tangent of an angle at the light:
-/// blockers outside are missed.
-const MOST_MARGIN: f64 = 0.5;
+/// Views reach at most this far beyond the receivers, as the tangent of an angle at the light. Blockers
+/// so near to the light that rays pass them farther outside have views of their own.
+const MOST_MARGIN: f64 = 1.0;
 
 /// Nearest depth of a caster as a part of the light's reach: what is nearer is cut off.
 const NEAREST: f64 = 1.0 / 64.0;
@@ -42,41 +43,61 @@ pub(super) struct MdiViews {
     pub capacity: u32,
 }
 
+/// Views that look at all receivers, and at all blockers of their light but for what is nearer to the
+/// light than a 64th of its reach. `casters`: corners of boxes, x changing fastest, then y; scene space,
+/// metres. `picture`: its size in pixels.
 pub(super) fn mdi_views(
     light: &AreaLight,
     receivers: &[Vec<DVec3>],
-    casters: &[Aabb],
+    casters: &[[Vec3; 8]],
     triangles: u32,
-    (options, size): (&MdiOptions, u32),
+    (options, picture): (&MdiOptions, [u32; 2]),
 ) -> MdiViews {
-    let around = casters.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
+    let corners = || casters.iter().flatten().map(|corner| corner.as_dvec3());
+    let mut around = Aabb::EMPTY;
+    casters.iter().flatten().for_each(|p| around.insert(*p));
     let sun = light.shape.is_sun();
     let reach = f64::from(light.shape.reach());
     let center = light.center.as_dvec3();
-    let distance = |b: &Aabb| {
-        let nearest = light.center.clamp(b.min, b.max) - light.center;
-        f64::from(nearest.length())
-    };
-    let nearest = casters.iter().map(distance).fold(f64::INFINITY, f64::min);
-    let margin = if sun {
-        reach * f64::from(around.radius())
+    let distances = casters.iter().map(|b| distance_to(b, center));
+    let nearest = distances.fold(f64::INFINITY, f64::min);
+    let views = if sun {
+        let middle = around.center().as_dvec3();
+        let radius = corners().map(|p| p.distance(middle)).fold(0.0, f64::max);
+        light_views(light, receivers, &around, reach * radius)
     } else {
-        (reach / nearest.max(reach).max(1.0e-6)).min(MOST_MARGIN)
+        // Rays pass blockers near the light far beside the receivers: these must be in some view too.
+        let close = |b: &&[Vec3; 8]| reach > MOST_MARGIN * distance_to(b, center);
+        let close = casters.iter().filter(close);
+        let close = close.map(|corners| corners.map(|p| p.as_dvec3()).to_vec());
+        let mut seen = receivers.to_vec();
+        seen.extend(close.take(if receivers.is_empty() { 0 } else { usize::MAX }));
+        let margin = (reach / nearest.max(reach).max(1.0e-6)).min(MOST_MARGIN);
+        light_views(light, &seen, &around, margin)
     };
-    let views = light_views(light, receivers, &around, margin);
     let count = views.views.len() as u32;
-    let capacity = options.depths * size * size * count.max(1);
+    let across = views.views.first().map_or(0.0, |view| {
+        penumbra_across(view, 2.0 * reach, corners().map(|p| p - center), sun)
+    });
+    let size = options.side(picture, count, across);
+    let room = u64::from(options.depths) * u64::from(size * size) * u64::from(count.max(1));
+    let capacity = room.min(u64::from(MOST_DEPTHS)) as u32;
+    // All rays to a light without size are one, and its shadow has an edge.
+    let hard = reach == 0.0 && options.footprint == Footprint::Point;
+    let ray_count = if hard { 1 } else { options.rays };
     let origin = if sun { DVec3::ZERO } else { center };
     let mut params = MdiParams {
         counts: [count, size, capacity, triangles],
         options: [
             options.buckets,
             u32::from(options.nearest),
-            options.rays,
+            ray_count,
             u32::from(options.random)
                 | (u32::from(options.footprint == Footprint::Pixel) << 1)
-                | (u32::from(options.dithered) << 2)
-                | (u32::from(light.is_uneven()) << 3),
+                | (u32::from(options.dithered && reach > 0.0) << 2)
+                | (u32::from(light.is_uneven()) << 3)
+                | (u32::from(!options.early) << 4)
+                | (u32::from(options.sides) << 5),
         ],
         origin: origin.as_vec3().extend(0.0).to_array(),
         views: [LightView::default(); MAX_LIGHT_VIEWS],
@@ -87,8 +108,7 @@ pub(super) fn mdi_views(
         params.views[index] = *view;
         let [x, y, z, _] = view.forward.map(f64::from);
         let forward = DVec3::new(x, y, z);
-        let corners = casters.iter().flat_map(|b| b.corners());
-        let depths = corners.map(|c| (c.as_dvec3() - origin).dot(forward));
+        let depths = corners().map(|corner| (corner - origin).dot(forward));
         let (near, far) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| {
             (a.min(z), b.max(z))
         });
@@ -128,14 +148,10 @@ pub(super) fn mdi_views(
     }
     // Random rays of an uneven light go to any place of a full table.
     let drawn = options.random && light.is_uneven();
-    let places = if drawn {
-        MOST_RAYS as u32
-    } else {
-        options.rays
-    };
+    let places = if drawn { MOST_RAYS as u32 } else { ray_count };
     let mut rays = ray_table(light, places);
     for ray in rays.iter_mut().filter(|_| drawn) {
-        ray[2] = 1.0 / options.rays as f32;
+        ray[2] = 1.0 / ray_count as f32;
     }
     rays.resize(MOST_RAYS, [0.0; 4]);
     MdiViews {
@@ -145,4 +161,39 @@ pub(super) fn mdi_views(
         rays,
         capacity,
     }
+}
+
+/// Width of a usual penumbra as a part of the view's width: of a blocker a fifth of the way to the light
+/// before the farthest receiver, under a sun a twentieth of the casters' depth, of which the ground fills
+/// much. `wide`: the light's width in metres, of a sun at distance 1; `corners`: from the light.
+fn penumbra_across(
+    view: &LightView,
+    wide: f64,
+    corners: impl Iterator<Item = DVec3>,
+    sun: bool,
+) -> f64 {
+    let [x, y, ..] = view.scale.map(|v| f64::from(v.abs()));
+    let [fx, fy, fz, _] = view.forward.map(f64::from);
+    let depths = corners.map(|p| p.dot(DVec3::new(fx, fy, fz)));
+    let (near, far) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| {
+        (a.min(z), b.max(z))
+    });
+    let part = if sun {
+        0.05 * (far - near)
+    } else {
+        0.25 / far.max(1.0e-6)
+    };
+    wide * part * x.max(y)
+}
+
+/// From a point to a box, 0 inside; metres.
+fn distance_to(corners: &[Vec3; 8], point: DVec3) -> f64 {
+    let first = corners[0].as_dvec3();
+    let mut offset = point - first;
+    for corner in [1, 2, 4] {
+        let edge = corners[corner].as_dvec3() - first;
+        let square = edge.length_squared().max(f64::MIN_POSITIVE);
+        offset -= edge * (offset.dot(edge) / square).clamp(0.0, 1.0);
+    }
+    offset.length()
 }

@@ -86,7 +86,10 @@ show_jobs() {
 }
 gpu_jobs() {
     if [ ${#gpu_tests[@]} -eq 0 ]; then return; fi
-    start_job "GPU tests on $1" cargo test "${gpu_tests[@]}" -- --test-threads=1
+    # What shows that the validation layer sees a missing barrier has nothing to do with the driver.
+    local skip=()
+    if [ $# -gt 1 ]; then skip=(--skip random_graphs_without_one_of_their_barriers); fi
+    start_job "GPU tests on $1" cargo test "${gpu_tests[@]}" -- --test-threads=1 "${skip[@]}"
     # All relations over all stress scenes take minutes: once, and elsewhere each scene by itself.
     start_job "stress scenes on $1" cargo test --test capture_stress -- --test-threads=1 "${@:2}"
 }

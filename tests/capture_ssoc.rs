@@ -5,8 +5,10 @@ mod support;
 
 use antumbra::capture::{FrameRenderer, FrameRequest};
 use antumbra::light::LightShape;
-use antumbra::scene::{Primitive, Scene};
-use glam::Vec3;
+use antumbra::scene::{AlphaMode, Material, Primitive, Scene, Texture, TextureImage, Wrap};
+use antumbra::shadow::Technique;
+use glam::{Vec2, Vec3};
+use std::collections::BTreeMap;
 use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, quad, scene};
 
 const DISK: LightShape = LightShape::Disk { radius: 1.0 };
@@ -289,6 +291,117 @@ fn a_light_of_no_size_is_hard_and_nothing_is_full_light() {
     assert!(empty[0].iter().all(|v| *v == 1.0));
     let covered = render(&under(&[(5.0, [-9.0, 9.0], [-9.0, 9.0])], DISK), &["ssoc"]);
     assert!(covered[0].iter().all(|v| *v == 0.0));
+}
+
+/// Parts that rounding has moved apart, and corners amid another part's side, let no light through.
+#[test]
+fn cracks_are_no_outlines() {
+    let _one = support::serial();
+    let parts = [
+        (5.0, [-30.0, 0.1], ENDLESS),
+        (5.0, [0.1 + 1.0e-6, 30.0], [-30.0, 0.2]),
+        (5.0, [0.1, 30.0], [0.2, 30.0]),
+    ];
+    let image = &render(&under(&parts, DISK), &["ssoc"])[0];
+    let most = image.iter().copied().fold(0.0, f32::max);
+    assert!(most <= 1.0e-3, "{most}");
+}
+
+/// A plate whose texture could have holes has no edges on the list, and what is past a solid strip
+/// before it is not free.
+#[test]
+fn cut_out_plates_hide_what_is_past_solid_ones() {
+    let _one = support::serial();
+    let all = [(5.0, [-30.0, 0.1], ENDLESS), (4.0, [-0.3, -0.1], ENDLESS)];
+    let mut scene = under(&all, DISK);
+    scene.images.push(TextureImage {
+        name: "opaque".to_string(),
+        width: 1,
+        height: 1,
+        texels: vec![[255; 4]],
+    });
+    scene.materials.push(Material {
+        alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+        base_texture: Some(Texture {
+            image: 0,
+            wrap: [Wrap::Clamp; 2],
+        }),
+        ..Material::default()
+    });
+    scene.primitives[1].material = 1;
+    scene.primitives[1].uvs = vec![Vec2::ZERO; 4];
+    scene.finish().unwrap();
+    for image in render(&scene, &["ssoc", "ssoc:combine=rule"]) {
+        let (rms, worst) = errors(&image, 4, |p| truth(p, 1.0, &all, 4000));
+        println!("cut-out plate: rms {rms}, largest {worst}");
+        assert!(rms <= 0.04 && worst <= 0.15, "{rms}, {worst}");
+    }
+}
+
+/// Texels of a fine mesh lie before the plane of a receiver on it where the mesh is hollow.
+#[test]
+fn a_finely_meshed_bowl_does_not_shadow_itself() {
+    let _one = support::serial();
+    const CELLS: u32 = 200;
+    let mut bowl = Primitive::default();
+    for i in 0..=CELLS {
+        for j in 0..=CELLS {
+            let [x, z] = [i, j].map(|i| 0.6 * (i as f32 / CELLS as f32 - 0.5));
+            bowl.positions
+                .push(Vec3::new(x, 0.2 + 2.0 * (x * x + z * z), z));
+            bowl.normals.push(Vec3::Y);
+        }
+    }
+    for (i, j) in (0..CELLS).flat_map(|i| (0..CELLS).map(move |j| (i, j))) {
+        let a = i * (CELLS + 1) + j;
+        let [b, c, d] = [a + 1, a + CELLS + 1, a + CELLS + 2];
+        bowl.indices.extend([a, b, c, c, b, d]);
+    }
+    let small = LightShape::Disk { radius: 0.1 };
+    let images = render(&scene(vec![bowl], small), &["hard", "ssoc"]);
+    for image in images {
+        let dark = image.iter().filter(|v| **v < 0.99).count();
+        assert_eq!(dark, 0);
+    }
+}
+
+/// Counts of the distortion maps, and a word where the light is too large for them.
+#[test]
+fn crowded_maps_are_counted() {
+    let _one = support::serial();
+    // Plates 0.05 m wide, as far apart.
+    let row: Vec<_> = (-20..20)
+        .map(|i| (5.0, [0.1 * i as f32, 0.1 * i as f32 + 0.05], [-1.0, 1.0]))
+        .collect();
+    let technique: Technique = "ssoc".parse().unwrap();
+    let counted = |radius: f32| {
+        let scene = under(&row, LightShape::Disk { radius });
+        let mut renderer = FrameRenderer::owning(support::gpu(), scene).unwrap();
+        let request = FrameRequest {
+            camera: camera(),
+            size: [SIZE; 2],
+            lights: vec![0],
+            technique,
+        };
+        let plain = renderer.render(&request).unwrap();
+        assert!(plain.lights[0].counters.is_empty());
+        assert!(!plain.report.passes.iter().any(|p| p.contains("collisions")));
+        let counted = renderer.render_counted(&request).unwrap();
+        assert_eq!(counted.lights[0].visibility, plain.lights[0].visibility);
+        support::assert_no_messages(&renderer.destroy().unwrap());
+        counted.lights[0].counters.clone()
+    };
+    let share = |counters: &BTreeMap<String, u64>| {
+        counters["crowded_texels"] as f64 / counters["band_texels"] as f64
+    };
+    let [small, large] = [0.01, 1.0].map(counted);
+    println!("{small:?}, {large:?}");
+    // The floor's four edges and those of the plates.
+    assert_eq!((small["silhouettes"], large["silhouettes"]), (164, 164));
+    assert!(share(&small) < 0.1 && share(&large) > 0.9);
+    assert!(technique.remark(&small).is_none());
+    let word = technique.remark(&large).unwrap();
+    assert!(word.contains("outgrown"), "{word}");
 }
 
 /// A floor's own border is a silhouette, and hides nothing from the floor.

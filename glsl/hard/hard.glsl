@@ -6,7 +6,7 @@
 // exact wherever triangles are wider than a texel, so that shadow edges are straight and in their
 // place, and surfaces do not shadow themselves. Narrower triangles may hide between texel centres;
 // for them depths decide, compared with the depth that the receiver's plane has at the texel's
-// centre.
+// centre, less what a mesh that fine may bend by in the width of a texel.
 #ifndef ANTUMBRA_HARD_GLSL
 #define ANTUMBRA_HARD_GLSL
 
@@ -95,6 +95,17 @@ float largest_coordinate(Receiver receiver) {
 const vec4 GATHER_X = vec4(0.0, 1.0, 1.0, 0.0);
 const vec4 GATHER_Y = vec4(1.0, 1.0, 0.0, 0.0);
 
+// How far, in stored depth, a texel of a finely meshed surface may be before the plane of a receiver on
+// that surface: meshes bend by up to half a radian from one triangle to the next, over the width of a
+// texel. expected: stored depth of the plane; slope: its change over a texel; texel_m: as above.
+float bend_slack(LightView view, float expected, vec2 slope, float texel_m) {
+    const float BEND = 0.5;
+    const float MOST_TEXELS = 4.0;
+    // A texel's width as a difference of stored depths.
+    float width = texel_m * (view.forward.w > 0.0 ? abs(expected) : abs(view.scale.z));
+    return min(BEND * (width + dot(slope, slope) / max(width, 1.0e-30)), MOST_TEXELS * width);
+}
+
 // 1 where the light's centre is seen, else 0. map: the receiver's place in the map, 0 to 1.
 float hard_visibility(Receiver receiver, LightView view, uint index, vec2 map, float size_texels) {
     vec2 place = map * size_texels - 0.5;
@@ -125,7 +136,8 @@ float hard_visibility(Receiver receiver, LightView view, uint index, vec2 map, f
         vec3 plane = light_view_plane(view, q, receiver.normal, (first + 0.5) / size_texels);
         vec2 slope = plane.yz / size_texels;
         vec4 expected = plane.x + slope.x * GATHER_X + slope.y * GATHER_Y;
-        float slack = (abs(slope.x) + abs(slope.y)) * SNAP_TEXELS + abs(plane.x) * DEPTH_ROUNDING;
+        float slack = (abs(slope.x) + abs(slope.y)) * SNAP_TEXELS + abs(plane.x) * DEPTH_ROUNDING
+            + bend_slack(view, plane.x, slope, texel_m);
         bvec4 in_front = greaterThan(gather_map_depths(middle, index), expected + slack);
         vec2 nearer = step(vec2(0.5), place - first);
         bool nearest_in_front = nearer.y > 0.5

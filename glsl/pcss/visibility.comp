@@ -7,6 +7,7 @@
 #include "common/combine.glsl"
 #include "common/light_above.glsl"
 #include "common/octahedral.glsl"
+#include "common/taps.glsl"
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
 #include "pcss/params.glsl"
@@ -35,12 +36,6 @@ layout(set = 0, binding = 6, std140) uniform Arguments {
 layout(set = 0, binding = 7) uniform usampler2D list;
 
 const float DEPTH_ROUNDING = 1.0 / 1048576.0;
-const float GOLDEN_ANGLE = 2.39996323;
-
-// Interleaved gradient noise (Jimenez 2014), 0 to 1.
-float gradient_noise(uvec2 pixel) {
-    return fract(52.9829189 * fract(dot(vec2(pixel), vec2(0.06711056, 0.00583715))));
-}
 
 // Tap index of count in the light's own coordinates, -1 to 1: evenly over its area.
 vec2 tap_place(uint index, uint count, float turn) {
@@ -51,8 +46,7 @@ vec2 tap_place(uint index, uint count, float turn) {
         // The additive recurrence of the plastic number (Roberts 2018) fills a square.
         return 2.0 * fract(vec2(0.7548776662, 0.5698402910) * float(index) + turn) - 1.0;
     }
-    float angle = GOLDEN_ANGLE * float(index) + 6.2831853 * turn;
-    return sqrt(part) * vec2(cos(angle), sin(angle));
+    return disk_tap(index, count, turn);
 }
 
 struct Neighbourhood {

@@ -29,6 +29,9 @@ layout(location = 3) flat out uint entry;   // texel of the map
 const uint FAN = 4u;
 const uint VERTICES = 12u + 6u * FAN;
 
+// 1: the bands alone, of the points that have an edge before them and not just an end.
+layout(constant_id = 0) const uint BANDS_ALONE = 0u;
+
 uvec4 fetch_edge_texel(ivec2 at) {
     return texelFetch(edges, at, 0);
 }
@@ -75,7 +78,7 @@ void main() {
     depths = vec4(0.0);
     entry = 0u;
     // Where the light's centre lies in all of its faces' planes, an edge has no side.
-    if (abs(faces) < 1.0e-5 || !clip_edge(view, near, a, b)) {
+    if (abs(faces) < 1.0e-5 || !clip_edge(view, near, a, b) || (BANDS_ALONE != 0u && vertex >= 6u)) {
         return;
     }
     vec2 p = perspective ? a.xy / a.z : a.xy;

@@ -87,22 +87,6 @@ float cell_seen(bool blocked, Seen near, Seen far, vec2 middle) {
     return one_blocker ? 1.0 - visibility_and(1.0 - seen, 1.0 - other, along) : seen;
 }
 
-// Mean depth of what is in front of the receiver within the light's reach, as of blockers whose
-// outlines are not edges, and how many were found. Depths as in Place.
-vec2 searched_depth(Place here, LightView light_view) {
-    float nearest = light_view.forward.w > 0.0 ? 1.0 / params.search.x : params.search.x;
-    float sum = 0.0;
-    float count = 0.0;
-    for (uint cell = 0u; cell < LOOKUPS; ++cell) {
-        vec2 map = map_of(light_view, passage(here, light_view, cell_middle(cell), nearest));
-        bool blocked = in_map(map) && blocked_at(here, map);
-        float depth = shown_depth(here, light_view, map);
-        sum += blocked ? depth : 0.0;
-        count += blocked ? 1.0 : 0.0;
-    }
-    return vec2(sum / max(count, 1.0), count);
-}
-
 float soft_cells(Place here, LightView light_view) {
     float texel = band_texel(light_view);
     uint first = 0u;
@@ -124,37 +108,34 @@ float soft_cells(Place here, LightView light_view) {
                 break;
             }
             bool blocked = cell == 0u ? here.hidden : blocked_at(here, map);
-            if (MASKED == 0u && cell > 0u && blocked) {
+            if (cell > 0u && blocked) {
                 blocked = still_blocked(here, light_view, middle, map, passed);
             }
             uint near_entry = edge_at(here, map, blocked);
             uint far_entry = edge_at(here, map, !blocked);
+            uint second_entry = LAYERS > 1u ? second_edge_at(here, map, blocked) : 0u;
             hard = blocked ? 0.0 : 1.0;
             // Without an outline near, it is as at the receiver's own place, or else as the first
             // edge has it.
-            seen = MASKED != 0u || blocked == here.hidden ? hard : cell_past(chord, middle);
-            if (cell > 0u && (near_entry & EDGE_NUMBER) == first && far_entry == 0u) {
-                seen = first == 0u && MASKED != 0u ? hard : cell_past(chord, middle);
+            seen = blocked == here.hidden ? hard : cell_past(chord, middle);
+            if (cell > 0u && (near_entry & EDGE_NUMBER) == first && far_entry == 0u && second_entry == 0u) {
+                seen = cell_past(chord, middle);
                 break;
             }
             Seen near = look_at(here, light_view, near_entry, at);
             Seen far = look_at(here, light_view, far_entry, at);
-            if (MASKED != 0u && blocked && near.number != 0u) {
-                // What is shown clearly before the edge is a blocker without edges.
-                const float BEFORE = 1.03;
-                float shown = rise_of(here, light_view, shown_depth(here, light_view, map));
-                bool before = shown > BEFORE * rise_of(here, light_view, near.depth);
-                near.number = before ? 0u : near.number;
+            // The second layer where the first one's edge is not in front of this receiver or out of reach.
+            if (LAYERS > 1u && near.number == 0u) {
+                near = look_at(here, light_view, second_entry, at);
+            }
+            if (LAYERS > 1u && far.number == 0u) {
+                far = look_at(here, light_view, second_edge_at(here, map, !blocked), at);
             }
             if (cell == 0u) {
                 Seen wide = near.number != 0u && (far.number == 0u || near.width > far.width) ? near : far;
                 depth = wide.depth;
                 if (wide.number == 0u) {
-                    vec2 searched = MASKED != 0u ? searched_depth(here, light_view) : vec2(0.0);
-                    if (searched.y == 0.0) {
-                        return hard;
-                    }
-                    depth = searched.x;
+                    return hard;
                 }
                 first = near.number;
                 chord = near.number != 0u ? near.chord : vec3(blocked ? -1.0 : 1.0, 1.0, 0.0);

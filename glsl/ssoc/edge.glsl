@@ -15,6 +15,7 @@ const float NORMAL_ROUNDING = 1.0e-4;
 
 // Defined by the entry file.
 uint fetch_map_edge(ivec3 texel);
+uint fetch_second_edge(ivec3 texel); // of those that another edge was before
 float fetch_map_depth(ivec3 texel);
 
 // The light as the disk that a receiver sees of it: offsets from the receiver to its centre and from
@@ -91,6 +92,12 @@ uint edge_at(Place here, vec2 map, bool inner) {
     ivec3 texel = texel_of(here, map, params.bands.x);
     texel.z = 2 * texel.z + (inner ? 1 : 0);
     return fetch_map_edge(texel);
+}
+
+uint second_edge_at(Place here, vec2 map, bool inner) {
+    ivec3 texel = texel_of(here, map, params.bands.x);
+    texel.z = 2 * texel.z + (inner ? 1 : 0);
+    return fetch_second_edge(texel);
 }
 
 float map_depth_at(Place here, vec2 map) {

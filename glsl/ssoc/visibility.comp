@@ -24,6 +24,8 @@ const uint COMBINE_AND = 4u;
 const uint COMBINE_OR = 5u;
 // 1: 3 t^2 - 2 t^3 instead of the disk's area.
 layout(constant_id = 5) const uint CUBIC = 0u;
+// Edges a texel of the distortion maps.
+layout(constant_id = 6) const uint LAYERS = 1u;
 
 layout(set = 0, binding = 0, std140) uniform View {
     ViewParams view;
@@ -48,8 +50,10 @@ layout(set = 0, binding = 13) uniform sampler2D triangles;
 layout(set = 0, binding = 14) uniform sampler2D materials;
 layout(set = 0, binding = 15) uniform sampler2D uvs;
 layout(set = 0, binding = 16) uniform sampler2D texels;
+layout(set = 0, binding = 17) uniform usampler2DArray map_second;
 
 #include "ssoc/cells.glsl"
+#include "ssoc/cutouts.glsl"
 #include "ssoc/published.glsl"
 
 uvec4 fetch_edge_texel(ivec2 at) {
@@ -86,6 +90,14 @@ uvec4 gather_map_ids(vec2 at, uint index) {
 
 uint fetch_map_edge(ivec3 texel) {
     return texelFetch(map_edges, texel, 0).x;
+}
+
+uint fetch_second_edge(ivec3 texel) {
+    return texelFetch(map_second, texel, 0).x;
+}
+
+uint fetch_map_id(ivec3 texel) {
+    return texelFetch(map_ids, texel, 0).x;
 }
 
 float fetch_map_depth(ivec3 texel) {
@@ -128,9 +140,15 @@ float pixel_visibility(uvec2 pixel) {
             Place here = Place(p, n, in_units, stored, plane, at.xy, found, hidden, disk);
             float seen = hidden ? 0.0 : 1.0;
             if (LIGHT_SHAPE != LIGHT_POINT) {
-                seen = COMBINE == COMBINE_CELLS
-                    ? soft_cells(here, light_view)
-                    : soft_published(here, light_view);
+                float turn = gradient_noise(pixel);
+                float past = MASKED != 0u ? past_cutouts(here, light_view, turn) : -1.0;
+                if (past >= 0.0) {
+                    seen = past;
+                } else {
+                    seen = COMBINE == COMBINE_CELLS
+                        ? soft_cells(here, light_view)
+                        : soft_published(here, light_view);
+                }
             }
             result = visibility_and(seen, above, 0.0);
         }

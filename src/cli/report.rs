@@ -44,6 +44,9 @@ pub(super) struct ImageEntry {
     pub(super) setup_ms: SetupTimes,
     pub(super) peak_bytes: PeakBytes,
     pub(super) counters: BTreeMap<String, u64>,
+    /// What the counters say about how far the result is to be trusted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) remark: Option<String>,
     /// With `--visibility-bound`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) bound: Option<BoundEntry>,

@@ -196,6 +196,7 @@ impl Shot {
                 .chain(counters)
                 .map(|(k, n)| (k.clone(), *n))
                 .collect(),
+            remark: self.technique.remark(counters),
             // It is the first light's.
             bound: self.bound().filter(|_| at == 0),
         })

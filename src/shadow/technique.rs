@@ -12,6 +12,7 @@ use super::ssoc::{self, SsocOptions};
 use super::{ShadowInputs, ShadowMask, hard, pcss};
 use crate::graph::Graph;
 use crate::light::{AreaLight, ShapeKind};
+use std::collections::BTreeMap;
 
 /// How visibility is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -374,6 +375,15 @@ impl Technique {
     /// ([`SceneBuffers::add_edges`](crate::renderer::SceneBuffers::add_edges)).
     pub fn reads_edges(self) -> bool {
         matches!(self, Self::Ssoc(_) | Self::Dbuffer(_))
+    }
+
+    /// What a light's counters ([`CapturedLight::counters`](crate::capture::CapturedLight::counters)) say
+    /// about how far the result is to be trusted, if anything.
+    pub fn remark(self, counters: &BTreeMap<String, u64>) -> Option<String> {
+        match self {
+            Self::Ssoc(_) => ssoc::remark(counters),
+            _ => None,
+        }
     }
 
     /// Declares the passes that make one light's visibility.

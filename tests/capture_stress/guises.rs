@@ -1,7 +1,7 @@
 //! The same case in other guises, and a small step from where it was.
 
 use crate::compare::{Change, flipped, known};
-use crate::limits::{MAY_FLIP, finished, judge, limits};
+use crate::limits::{MAY_FLIP, judge, limits, techniques};
 use crate::rig::{PIXELS, Rig};
 use crate::support;
 use antumbra::shadow::Technique;
@@ -37,7 +37,7 @@ fn scaled_or_far_away() {
         }
         let mut known: Vec<_> = guises.iter().map(|guise| known(guise).sure).collect();
         let here = crate::compare::known(case).sure;
-        for technique in finished() {
+        for technique in techniques() {
             if !is_asked(technique, case, number) {
                 continue;
             }
@@ -77,7 +77,7 @@ fn turned_moved_or_mirrored() {
         let turned = case.seen_as(&similarity);
         let mirrored = case.mirrored();
         let there = known(&turned).sure;
-        for technique in finished() {
+        for technique in techniques() {
             if !is_asked(technique, &case, number) {
                 continue;
             }
@@ -134,7 +134,7 @@ fn a_small_move_is_a_small_change() {
             let there = known(&moved);
             let sure = |i: usize| here.sure[i] && there.sure[i];
             let truth = Change::of(&here.center, &there.center, sure, 0.5);
-            for technique in finished() {
+            for technique in techniques() {
                 if !is_asked(technique, &case, number) {
                     continue;
                 }

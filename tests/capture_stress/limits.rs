@@ -155,34 +155,47 @@ pub fn limits(technique: Technique) -> Limits {
             jump: 0.25,
             flips: 0.0015,
         },
+        // Each of 13 places on the light is looked up in the maps, so that a step is a thirteenth. Rounding
+        // moves some of them to another texel, and with it to another edge: in a hundred scraps of paper 144 of 2542
+        // pixels change, by up to 0.08. A texel holds one edge: those of a wire that crosses a wider blocker
+        // push the blocker's out, and 104 of 3738 pixels get brighter by up to 0.17.
+        "ssoc" => Limits {
+            step: 1.0 / 13.0,
+            fine: 0.005,
+            own_walls: 0.0,
+            turned: 0.2,
+            turned_mean: 0.002,
+            brighter: 0.03,
+            jumps: 0.005,
+            jump: 0.25,
+            flips: 0.06,
+        },
         other => panic!("state the limits of technique `{other}` in {}", file!()),
     }
 }
 
 /// The most light that a technique lets out of a closed mesh. A surface that leans across the slices of
-/// `occlusion-textures` leaves a little between one slice's part of it and the next one's.
+/// `occlusion-textures` leaves a little between one slice's part of it and the next one's; where two cracks
+/// that rounding has left in a mesh meet, `ssoc` takes a few of their edges for outlines (19 of 4096 pixels).
 pub fn leak(technique: Technique) -> f32 {
     match technique.name() {
         "occlusion-textures" => 0.035,
         // Between two boundaries a ray passes texels that it is not tested in: 0.23 measured, 0.016 with
         // `sides=on`, which darkens penumbrae.
         "mdi" => 0.25,
+        "ssoc" => 0.04,
         _ => 0.0,
     }
 }
 
-/// Techniques that do not hold yet, and are not tested here before they do.
+/// All techniques.
 ///
 /// The relations are asked on Mesa, cases by themselves on SwiftShader too. Of the relations SwiftShader, with a
 /// sixteenth of the sub-texel steps, breaks some: `pcss` in `far-and-near` turned (59 of 3215 pixels),
 /// `occlusion-textures` in `shut-in` scaled (100 of 4096, by up to 0.01), and `oess` in `cage`, where a line lies
 /// within a mesh with dozens of holes and edges beside the line come and go (mean changes of up to 0.06).
-const IN_WORK: [&str; 1] = ["ssoc"];
-
-/// All techniques that must hold.
-pub fn finished() -> impl Iterator<Item = Technique> {
-    let all = Technique::ALL.iter().copied();
-    all.filter(|technique| !IN_WORK.contains(&technique.name()))
+pub fn techniques() -> impl Iterator<Item = Technique> {
+    Technique::ALL.iter().copied()
 }
 
 /// Fails on any fault.

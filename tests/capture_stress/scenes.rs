@@ -1,7 +1,7 @@
 //! Each case by itself.
 
 use crate::compare::{Change, known};
-use crate::limits::{finished, judge, leak, limits};
+use crate::limits::{judge, leak, limits, techniques};
 use crate::rig::{PIXELS, Rig};
 use crate::support;
 use antumbra::light::ShapeKind;
@@ -25,7 +25,7 @@ fn every_case() {
         let truth = known(case);
         let point = case.light_of_no_size();
         let of_point = known(&point);
-        for technique in finished() {
+        for technique in techniques() {
             let title = format!("{:28} {:5}", case.name, technique.name());
             let limits = limits(technique);
             if can_do(technique, case) {
@@ -90,7 +90,7 @@ fn lights_of_any_size() {
     for kind in ShapeKind::ALL {
         let of_kind = |case: &&Case| case.area_light().shape.kind() == kind;
         for case in all.iter().filter(of_kind).take(2) {
-            for technique in finished() {
+            for technique in techniques() {
                 let mut means = Vec::new();
                 for factor in LIGHT_FACTORS {
                     let case = case.light_scaled(factor);
@@ -126,7 +126,7 @@ fn a_blocker_more_never_brightens() {
     for (kind, shape) in shapes {
         let steps = steps_of_blockers(shape);
         let sure: Vec<Vec<bool>> = steps.iter().map(|case| known(case).sure).collect();
-        for technique in finished().chain([even]) {
+        for technique in techniques().chain([even]) {
             if !can_do(technique, &steps[0]) {
                 continue;
             }
@@ -180,7 +180,7 @@ fn one_and_a_half_million_triangles() {
     let truth = known(&case);
     println!("truth at {:.1?}", begin.elapsed());
     let mut rig = Rig::new();
-    for technique in finished() {
+    for technique in techniques() {
         let now = Instant::now();
         let first = rig.draw(&case, technique);
         let upload = now.elapsed();

@@ -15,7 +15,9 @@
 //! instead, and each is decided by the outline nearest to it: the first edge's answer is exact where
 //! its line is the only one, and changes by the cells that other edges cross. Of overlapping bands
 //! the edge wins that comes nearest to hiding the light's centre; published is the nearest in the
-//! image.
+//! image. An edge beside which a surface goes on, as at cracks that rounding leaves between parts, is no
+//! outline and is left out. Where alpha cuts holes into triangles no edges are known, and receivers that have such
+//! triangles before the light are left to the shadow map, filtered as by `pcss`.
 //!
 //! | pass | makes |
 //! |---|---|
@@ -23,14 +25,19 @@
 //! | `map` | depths and triangles seen from the light's centre |
 //! | `silhouettes.*` | the list of edges ([`super::silhouettes`]) |
 //! | `bands` | the outer and the inner distortion map of a view |
+//! | `bands_second` | with `layers=2`: what another edge was before there |
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
+//! | `collisions`, `crowding` | how many bands share texels, if anyone wants the counts |
 
+mod crowding;
 mod options;
+
+pub(super) use crowding::remark;
 
 pub use options::{Combine, SsocOptions};
 
-use super::light_view::{LightView, LightViews, MAX_LIGHT_VIEWS, light_views};
+use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
 use super::map::{ShadowMap, add_maps_of_size};
 use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
@@ -40,7 +47,8 @@ use super::{ShadowInputs, ShadowMask, shape_number};
 use crate::geometry::DrawTarget;
 use crate::gpu::{ComputePipelineDesc, DepthState, GraphicsPipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
-    Access, Bind, BufferId, Graph, ImageDesc, ImageId, ImagePart, Load, PassKind, Stage,
+    Access, Bind, BufferId, Graph, ImageDesc, ImageId, ImagePart, Load, PassBuilder, PassKind,
+    Stage,
 };
 use crate::light::ShapeKind;
 use ash::vk;
@@ -130,11 +138,30 @@ pub(super) fn add_passes<'f>(
     );
     let target = DrawTarget::Ids;
     let map = add_maps_of_size(graph, inputs, NAME, &views, target, options.resolution);
+    let ShadowMap {
+        depth,
+        ids: Some(ids),
+    } = map
+    else {
+        unreachable!("triangle numbers were asked for");
+    };
+    let map = (depth, ids);
     let list = add_silhouettes(graph, inputs, NAME, SilhouetteRule::Center, VERTICES);
-    let bands = add_bands(graph, inputs, &options, &views, buffer, map.depth, list);
+    let layers = views.views.len() as u32;
+    let drawing = Bands {
+        side: if layers == 0 { 1 } else { options.bands },
+        layers,
+        params: buffer,
+        map,
+        list,
+    };
+    let bands = drawing.add_maps(graph, inputs, None);
+    let second = (options.layers > 1).then(|| drawing.add_maps(graph, inputs, Some(bands)));
+    let bands = (bands, second.unwrap_or(bands));
     let visibility = add_visibility(graph, inputs, &options, buffer, map, bands);
     ShadowMask {
         silhouettes: Some(list),
+        tally: Some(drawing.add_counts(graph, inputs)),
         ..ShadowMask::new(visibility)
     }
 }
@@ -152,74 +179,116 @@ fn farthest(inputs: &ShadowInputs<'_>) -> f32 {
     points.map(|p| p.distance(center)).fold(0.0, f64::max) as f32
 }
 
-/// The distortion maps: R32_UINT, one more than the number of the edge, 0 for none, and its faces'
-/// side in the highest bit; for each view a layer for the outer and one for the inner map.
-fn add_bands(
-    graph: &mut Graph<'_>,
-    inputs: &ShadowInputs<'_>,
-    options: &SsocOptions,
-    views: &LightViews,
+/// What bands are drawn of, and where to.
+#[derive(Clone, Copy)]
+struct Bands {
+    /// Texels across and down a map.
+    side: u32,
+    /// Views, each with an outer and an inner map.
+    layers: u32,
     params: BufferId,
-    map: ImageId,
+    /// Depths, and numbers of triangles plus one.
+    map: (ImageId, ImageId),
     list: Silhouettes,
-) -> ImageId {
-    let name = &inputs.light_name;
-    let layers = views.views.len().max(1) as u32;
-    let side = if views.views.is_empty() {
-        1
-    } else {
-        options.bands
-    };
-    let image = |format| ImageDesc::new(format, side, side);
-    let numbers = image(vk::Format::R32_UINT).layers(2 * layers);
-    let mut bands = graph.create_image(format!("{NAME}.bands {name}"), numbers);
-    let center = if inputs.light.shape.is_sun() {
-        Vec3::ZERO
-    } else {
-        inputs.light.center
-    };
-    let (edges, points) = (inputs.ids.edges, inputs.ids.points);
-    for layer in 0..2 * layers {
-        let part = ImagePart::layer(layer);
-        let seen = ImagePart::layer(layer / 2);
-        // Nearness of the edge, as a depth.
-        let apart = image(vk::Format::D32_SFLOAT);
-        let apart = graph.create_image(format!("{NAME}.bands_apart {name}.{layer}"), apart);
-        let mut pass = graph.pass(format!("{NAME}.bands {name}.{layer}"), PassKind::Graphics);
-        bands = pass.color_part(bands, part, Load::Clear([0.0; 4]));
-        let _ = pass.depth(apart, Load::Clear([0.0; 4]));
-        if views.views.is_empty() {
-            continue;
+}
+
+impl Bands {
+    /// The distortion maps: R32_UINT, one more than the number of the edge, 0 for none, and its faces'
+    /// side in the highest bit; for each view a layer for the outer and one for the inner map. With
+    /// `first` given, of what these maps do not hold.
+    fn add_maps(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        first: Option<ImageId>,
+    ) -> ImageId {
+        let what = if first.is_some() {
+            "bands_second"
+        } else {
+            "bands"
+        };
+        let name = &inputs.light_name;
+        let image = |format| ImageDesc::new(format, self.side, self.side);
+        let maps = 2 * self.layers.max(1);
+        let numbers = image(vk::Format::R32_UINT).layers(maps);
+        let mut bands = graph.create_image(format!("{NAME}.{what} {name}"), numbers);
+        for layer in 0..maps {
+            // Nearness of the edge, as a depth.
+            let apart = image(vk::Format::D32_SFLOAT);
+            let apart = graph.create_image(format!("{NAME}.{what}_apart {name}.{layer}"), apart);
+            let pass_name = format!("{NAME}.{what} {name}.{layer}");
+            let mut pass = graph.pass(pass_name, PassKind::Graphics);
+            bands = pass.color_part(bands, ImagePart::layer(layer), Load::Clear([0.0; 4]));
+            let _ = pass.depth(apart, Load::Clear([0.0; 4]));
+            if self.layers > 0 {
+                let fragment = match first {
+                    None => &spirv::SSOC_BANDS_FRAG,
+                    Some(_) => &spirv::SSOC_BANDS_SECOND_FRAG,
+                };
+                let mut pipeline =
+                    GraphicsPipelineDesc::new(&spirv::SSOC_BANDS_VERT, Some(fragment));
+                pipeline.depth = Some(DepthState {
+                    compare: vk::CompareOp::GREATER,
+                    write: true,
+                });
+                self.draw(pass, inputs, layer, pipeline, first);
+            }
         }
-        list.read(&mut pass, inputs);
-        pass.read(params, Access::Uniform(Stage::Vertex));
-        pass.read(params, Access::Uniform(Stage::Fragment));
-        pass.read_part(map, seen, Access::Sampled(Stage::Fragment));
+        bands
+    }
+
+    /// Draws one side of all edges into the pass's images.
+    fn draw(
+        &self,
+        mut pass: PassBuilder<'_, '_>,
+        inputs: &ShadowInputs<'_>,
+        layer: u32,
+        pipeline: GraphicsPipelineDesc,
+        first: Option<ImageId>,
+    ) {
+        let Self {
+            params, map, list, ..
+        } = *self;
+        let center = if inputs.light.shape.is_sun() {
+            Vec3::ZERO
+        } else {
+            inputs.light.center
+        };
         let push = BandsPush {
             center: center.extend(0.0).to_array(),
             view: layer / 2,
             side: layer % 2,
         };
+        let (edges, points) = (inputs.ids.edges, inputs.ids.points);
+        let (depths, ids) = map;
+        let triangles = inputs.ids.triangles;
+        let seen = ImagePart::layer(layer / 2);
+        list.read(&mut pass, inputs);
+        pass.read(params, Access::Uniform(Stage::Vertex));
+        pass.read(params, Access::Uniform(Stage::Fragment));
+        pass.read_part(depths, seen, Access::Sampled(Stage::Fragment));
+        pass.read_part(ids, seen, Access::Sampled(Stage::Fragment));
+        pass.read(triangles, Access::Sampled(Stage::Fragment));
+        let own = ImagePart::layer(layer);
+        if let Some(first) = first {
+            pass.read_part(first, own, Access::Sampled(Stage::Fragment));
+        }
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
-            let fragment = Some(&spirv::SSOC_BANDS_FRAG);
-            let mut pipeline = GraphicsPipelineDesc::new(&spirv::SSOC_BANDS_VERT, fragment);
-            pipeline.depth = Some(DepthState {
-                compare: vk::CompareOp::GREATER,
-                write: true,
-            });
-            let bindings = [
+            let mut bindings = vec![
                 Bind::uniform(0, params),
                 Bind::sampled(1, list.list, nearest),
                 Bind::sampled(2, edges, nearest),
                 Bind::sampled(3, points, nearest),
-                Bind::sampled(4, map, nearest).part(seen),
+                Bind::sampled(4, depths, nearest).part(seen),
+                Bind::sampled(5, ids, nearest).part(seen),
+                Bind::sampled(6, triangles, nearest),
             ];
-            ctx.bind_graphics(pipeline, &bindings, bytemuck::bytes_of(&push))?;
+            bindings.extend(first.map(|first| Bind::sampled(7, first, nearest).part(own)));
+            ctx.bind_graphics(pipeline.clone(), &bindings, bytemuck::bytes_of(&push))?;
             list.draw(ctx)
         });
     }
-    bands
 }
 
 fn add_visibility<'f>(
@@ -227,16 +296,9 @@ fn add_visibility<'f>(
     inputs: &ShadowInputs<'f>,
     options: &SsocOptions,
     params: BufferId,
-    map: ShadowMap,
-    bands: ImageId,
+    (map_depth, map_ids): (ImageId, ImageId),
+    (bands, second): (ImageId, ImageId),
 ) -> ImageId {
-    let ShadowMap {
-        depth: map_depth,
-        ids: Some(map_ids),
-    } = map
-    else {
-        unreachable!("triangle numbers were asked for");
-    };
     let name = &inputs.light_name;
     let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.reach());
     let list = receivers.list;
@@ -256,7 +318,8 @@ fn add_visibility<'f>(
         ids.points,
         ids.triangles,
     ];
-    for image in images.into_iter().chain(ids.mask_images()) {
+    let other = (second != bands).then_some(second);
+    for image in images.into_iter().chain(ids.mask_images()).chain(other) {
         pass.read(image, Access::Sampled(Stage::Compute));
     }
     list.read(&mut pass);
@@ -284,6 +347,7 @@ fn add_visibility<'f>(
             Bind::sampled(14, ids.materials, nearest),
             Bind::sampled(15, ids.triangle_uvs, nearest),
             Bind::sampled(16, ids.texels, nearest),
+            Bind::sampled(17, second, nearest).array(),
         ];
         let steps = ctx.gpu().info().limits.sub_pixel_precision_bits.min(16);
         let snap = 4.0 / (1u32 << steps) as f32;
@@ -295,6 +359,7 @@ fn add_visibility<'f>(
                 (3, options.lookups),
                 (4, options.combine as u32),
                 (5, u32::from(options.cubic)),
+                (6, options.layers),
             ],
             ..ComputePipelineDesc::new(&spirv::SSOC_VISIBILITY_COMP)
         };

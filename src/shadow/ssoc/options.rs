@@ -37,6 +37,9 @@ pub struct SsocOptions {
     pub resolution: u32,
     /// Texels across and down each distortion map, 64 to 4096.
     pub bands: u32,
+    /// Edges that a texel of the distortion maps holds, 1 or 2; the second is read by
+    /// [`Combine::Cells`] alone.
+    pub layers: u32,
     /// Places of the distortion maps that a pixel looks at, 1 to 32; 6 at most but for
     /// [`Combine::Cells`].
     pub lookups: u32,
@@ -51,6 +54,7 @@ impl SsocOptions {
     pub const DEFAULT: Self = Self {
         resolution: 1024,
         bands: 1024,
+        layers: 1,
         lookups: 13,
         combine: Combine::Cells,
         cubic: false,
@@ -69,6 +73,12 @@ impl SsocOptions {
             "1024",
             "64 to 4096",
             "texels across and down each distortion map",
+        ),
+        TechniqueOption::new(
+            "layers",
+            "1",
+            "1 or 2, which combine=cells reads",
+            "edges that a texel of the distortion maps holds",
         ),
         TechniqueOption::new(
             "lookups",
@@ -96,6 +106,7 @@ impl SsocOptions {
         vec![
             self.resolution.to_string(),
             self.bands.to_string(),
+            self.layers.to_string(),
             self.lookups.to_string(),
             combine.map_or("", |(name, _)| name).to_string(),
             if self.cubic { "cubic" } else { "exact" }.to_string(),
@@ -110,6 +121,7 @@ impl SsocOptions {
         match option {
             "resolution" => self.resolution = number(64..=4096)?,
             "bands" => self.bands = number(64..=4096)?,
+            "layers" => self.layers = number(1..=2)?,
             "lookups" => self.lookups = number(1..=32)?,
             "combine" => self.combine = COMBINE.iter().find(|(name, _)| *name == value)?.1,
             "area" => {

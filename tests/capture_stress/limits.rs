@@ -140,15 +140,14 @@ pub fn limits(technique: Technique) -> Limits {
             flips: MAY_FLIP,
         },
         // Texels lie elsewhere once the scene is turned: 0.075 under a grazing light, whose texels stretch
-        // over many pixels, and 0.3 under a light of a micrometre, of which three of 3039 pixels change.
-        // A blocker a millimetre from the light is cut off where it is nearer than a 64th of the light's
-        // reach: 0.008 of the picture. A centimetre in a view of kilometres is less than a texel. Four
+        // over many pixels. A blocker a millimetre from the light is cut off where it is nearer than a 64th
+        // of the light's reach: 0.008 of the picture. A centimetre in a view of kilometres is less than a texel. Four
         // pixels of 2922 see one ray more or less of a scaled scene.
         "mdi" => Limits {
             step: 1.0 / 64.0,
             fine: 0.006,
             own_walls: 0.0,
-            turned: 0.31,
+            turned: 0.08,
             turned_mean: 0.01,
             brighter: 0.0005,
             jumps: 0.001,

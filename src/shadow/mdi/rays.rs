@@ -57,7 +57,7 @@ fn disk_place([x, y]: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::LightWeights;
+    use crate::light::{LightProfile, LightWeights};
     use glam::Vec3;
 
     fn at(shape: LightShape) -> AreaLight {
@@ -81,6 +81,14 @@ mod tests {
             corners[usize::from(x > 0.0) + 2 * usize::from(y > 0.0)] += 1;
         }
         assert!(corners.iter().all(|n| (15..=17).contains(n)), "{corners:?}");
+
+        // Brightness that rises from 0: a quarter of the light is in the first half.
+        let light = AreaLight {
+            profile: LightProfile::new(&[0.0, 1.0]).unwrap(),
+            ..at(LightShape::Line { length: 1.0 })
+        };
+        let rays = ray_table(&light, 64);
+        assert_eq!(rays.iter().filter(|ray| ray[0] < 0.0).count(), 16);
     }
 
     #[test]

@@ -359,9 +359,15 @@ fn a_finely_meshed_bowl_does_not_shadow_itself() {
     }
     let small = LightShape::Disk { radius: 0.1 };
     let images = render(&scene(vec![bowl], small), &["hard", "ssoc"]);
+    // A device with 16 steps to a texel bends triangles of a texel's width more than the mesh does: 71 of
+    // 4096 pixels of SwiftShader.
+    let gpu = support::gpu();
+    let few_steps = gpu.info().limits.sub_pixel_precision_bits < 8;
+    support::assert_no_messages(&gpu.destroy().unwrap());
+    let most = if few_steps { 80 } else { 0 };
     for image in images {
         let dark = image.iter().filter(|v| **v < 0.99).count();
-        assert_eq!(dark, 0);
+        assert!(dark <= most, "{dark} pixels");
     }
 }
 

@@ -516,6 +516,19 @@ fn little_room_changes_nothing() {
     assert_eq!(images[0], images[1]);
 }
 
+/// Where a tile has more edges than asked for, rays to the samples tell the same but for sampling.
+#[test]
+fn rays_do_for_edges() {
+    let _one = support::serial();
+    let plates = [(3.0, [-0.2, 0.1], ENDLESS), (5.0, ENDLESS, [-0.3, 0.2])];
+    let techniques = ["dbuffer:samples=64", "dbuffer:samples=64,most-edges=0"];
+    let found = all_errors(&under(&plates, DISK), &techniques, |p, way| {
+        meets_plates(&plates, p, way)
+    });
+    println!("rays: {found:?}");
+    assert!(found[0].0 <= 0.01 && found[1].0 <= 0.02 && found[1] != found[0]);
+}
+
 #[test]
 fn a_light_of_no_size_is_hard_and_nothing_is_full_light() {
     let _one = support::serial();

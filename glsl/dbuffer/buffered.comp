@@ -162,6 +162,14 @@ bool is_strip(Crossing one, Crossing other) {
     return one.blocker == other.blocker && dot(apart, one.open) < 0.0 && dot(apart, other.open) > 0.0;
 }
 
+// Edges of a blocker that face nearly the same way are on one side of it: the first of them tells what is
+// seen past that side.
+const float ONE_SIDE = 0.7;
+
+bool is_same_side(Crossing one, Crossing other) {
+    return one.blocker == other.blocker && dot(one.open, other.open) > ONE_SIDE;
+}
+
 float pixel_visibility(uvec2 pixel) {
     float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
     uint id = texelFetch(ids, ivec2(pixel), 0).x;
@@ -199,7 +207,7 @@ float pixel_visibility(uvec2 pixel) {
     float size = float(dbuffer.counts.y);
     ivec3 place = ivec3(ivec2(min(at.xy * size, size - 1.0)), int(index));
 
-    Crossing kept[4];
+    Crossing kept[8]; // of both kinds
     uint count = 0u;
     for (uint layer = 0u; layer < push.layers; ++layer) {
         uvec2 stored = fetch_surface(layer, umbra, place);
@@ -214,7 +222,11 @@ float pixel_visibility(uvec2 pixel) {
         for (uint i = 0u; i < count; ++i) {
             known = known || kept[i].blocker == found.blocker;
         }
-        if (!found.between || (push.darkest != 0u && known)) {
+        bool side = false;
+        for (uint i = 0u; i < count; ++i) {
+            side = side || is_same_side(kept[i], found);
+        }
+        if (!found.between || (push.darkest != 0u && known) || (push.edges != 0u && push.darkest == 0u && side)) {
             continue;
         }
         if (count == 0u) {
@@ -229,6 +241,7 @@ float pixel_visibility(uvec2 pixel) {
     }
     // Edges of whose surfaces the ray crosses those of the other kind: the far edge of a strip, and other
     // blockers that leave the light's centre free.
+    uint own = count;
     bool others = push.darkest == 0u && push.edges != 0u && push.layers > 1u;
     for (uint layer = 0u; others && layer < push.layers && count > 0u; ++layer) {
         uvec2 stored = fetch_surface(layer, !umbra, place);
@@ -237,10 +250,15 @@ float pixel_visibility(uvec2 pixel) {
         }
         Crossing found = crossing_at_edge(r, stored, !umbra);
         float seen = curve_of(found.t);
-        if (found.between && !umbra && is_strip(kept[0], found)) {
+        bool matters = umbra ? found.blocker != kept[0].blocker : is_strip(kept[0], found);
+        bool side = false;
+        for (uint i = own; i < count; ++i) {
+            side = side || is_same_side(kept[i], found);
+        }
+        if (found.between && matters && !side) {
             result = joined(result, kept[0], seen, found);
-        } else if (found.between && umbra && found.blocker != kept[0].blocker) {
-            result = joined(result, kept[0], seen, found);
+            kept[count] = found;
+            count += 1u;
         }
     }
     return min(clamp(result, 0.0, 1.0), above);

@@ -52,7 +52,15 @@ void add_cutout(CoverageReceiver r, uint triangle, inout uvec2 seen) {
         within.y |= i < 8u ? 0u : bits << (4u * i & 31u);
     }
     within &= seen;
+    if ((within.x | within.y) == 0u) {
+        return;
+    }
     uint material = material_number(plane.w);
+    float alpha = fetch_base_color(material).a;
+    float cutoff = fetch_finish(material).z;
+    vec4 texture_place = fetch_texture(material);
+    vec4 uv_ab = fetch_uv_texel(triangle_texel_place(2u * triangle));
+    vec2 uv_c = fetch_uv_texel(triangle_texel_place(2u * triangle + 1u)).xy;
     while ((within.x | within.y) != 0u) {
         uint sample_index = within.x != 0u ? uint(findLSB(within.x)) : 32u + uint(findLSB(within.y));
         uint fours = sample_index / 4u;
@@ -62,7 +70,9 @@ void add_cutout(CoverageReceiver r, uint triangle, inout uvec2 seen) {
         float sum = weights.x + weights.y + weights.z;
         weights = sum != 0.0 ? weights / sum : vec3(1.0, 0.0, 0.0);
         uvec2 bit = sample_index < 32u ? uvec2(1u << sample_index, 0u) : uvec2(0u, 1u << (sample_index - 32u));
-        seen &= is_hole(material, fetch_uv(triangle, weights)) ? uvec2(0xffffffffu) : ~bit;
+        vec2 uv = weights.x * uv_ab.xy + weights.y * uv_ab.zw + weights.z * uv_c;
+        bool hole = alpha * texture_color(texture_place, uv).a < cutoff;
+        seen &= hole ? uvec2(0xffffffffu) : ~bit;
         within &= ~bit;
     }
 }

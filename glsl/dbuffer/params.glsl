@@ -8,7 +8,8 @@ struct DbufferParams {
     uvec4 counts; // width and height of the picture in pixels, nodes, chunks of the pool of lists
     // Places on the light, -1 to 1 along both of its axes: four first places, then their four second ones.
     vec4 samples[MOST_SAMPLE_TEXELS];
-    uvec4 sizes;  // blocks of silhouettes; lists of a tile: those, and one more of triangles with holes
+    uvec4 sizes;  // blocks of silhouettes; lists of a tile: those, and one more for triangles with holes;
+                  // most edges of a tile: receivers of tiles with more send rays
 };
 
 #endif

@@ -38,9 +38,6 @@ layout(set = 0, binding = 18, std140) uniform ThroughBlock {
     Through through;
 };
 
-// 1 where triangles of the scene may have holes.
-layout(constant_id = 2) const uint MASKED = 0u;
-
 #include "dbuffer/coverage.glsl"
 #include "dbuffer/cutouts.glsl"
 #include "dbuffer/ray.glsl"
@@ -81,7 +78,11 @@ const float FEW = 1.0e-5;
 
 // Rays that a receiver may send to tell how many layers there are, and samples that may be off by rounding.
 const uint MOST_RAYS = 4u;
+
 const uint FEW_SAMPLES = 2u;
+
+// Most triangles with holes of a tile that receivers look at: where there are more, they send rays.
+const uint MOST_CUTOUTS = 1024u;
 
 // 1 where a sample is above the receiver's plane.
 vec4 above_plane(vec3 horizon, uint i) {
@@ -116,6 +117,22 @@ void add_edges(uint tile, uint tiles, CoverageReceiver r, inout Coverage found) 
     }
 }
 
+// Edges that a receiver of the tile would look at.
+uint edges_of(uint tile, uint tiles) {
+    uint count = 0u;
+    for (uint block = 0u; block < params.sizes.x; ++block) {
+        uvec4 stored = texelFetch(lists, list_place(block, tile, tiles), 0);
+        count += stored.y + stored.w - stored.z;
+    }
+    return count;
+}
+
+// Triangles with holes that it would look at, or nodes in which they may be.
+uint cutouts_of(uint tile, uint tiles) {
+    uvec4 stored = texelFetch(lists, list_place(params.sizes.x, tile, tiles), 0);
+    return stored.y + stored.w - stored.z;
+}
+
 // All of a tile's triangles with holes.
 void add_cutouts(uint tile, uint tiles, CoverageReceiver r, inout uvec2 seen) {
     uvec4 stored = texelFetch(lists, list_place(params.sizes.x, tile, tiles), 0);
@@ -146,23 +163,38 @@ void add_cutouts(uint tile, uint tiles, CoverageReceiver r, inout uvec2 seen) {
     }
 }
 
-// The part of the light that rays to its samples reach, of what is above the receiver's plane.
-float traced(CoverageReceiver r, vec3 horizon, bool whole, uint tile, uint tiles) {
-    uvec2 seen = uvec2(0u);
-    float weight = 0.0;
+// How many of some samples of the light, a bit for each, rays do not reach. Where steps run out, those
+// reached so far count for all.
+float hidden_samples(CoverageReceiver r, uvec2 wanted, uint kinds, uint steps) {
+    float all = float(bitCount(wanted.x) + bitCount(wanted.y));
+    float done = 0.0;
+    float hidden = 0.0;
     for (uint i = 0u; i < 4u * FOURS; ++i) {
-        vec2 place = vec2(params.samples[2u * (i / 4u)][i % 4u], params.samples[2u * (i / 4u) + 1u][i % 4u]);
-        if (whole || dot(horizon, vec3(place, 1.0)) > 0.0) {
-            weight += 1.0;
-            bool blocked = ray_is_blocked(r.p, to_light_place(r, place), false, params.counts.z, r.rounding_m);
-            uint bit = blocked ? 0u : 1u << (i & 31u);
-            seen |= i < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
+        uint word = i < 32u ? wanted.x : wanted.y;
+        if ((word >> (i & 31u) & 1u) != 0u && steps < MOST_STEPS) {
+            vec2 place = vec2(params.samples[2u * (i / 4u)][i % 4u], params.samples[2u * (i / 4u) + 1u][i % 4u]);
+            bool sun = LIGHT_SHAPE == LIGHT_SUN;
+            vec3 to = to_light_place(r, place);
+            bool blocked = ray_is_blocked(r.p, to, sun, params.counts.z, r.rounding_m, kinds, steps);
+            bool known = blocked || steps < MOST_STEPS;
+            done += known ? 1.0 : 0.0;
+            hidden += blocked ? 1.0 : 0.0;
         }
     }
-    if (MASKED != 0u) {
-        add_cutouts(tile, tiles, r, seen);
+    return done > 0.0 ? hidden / done * all : 0.0;
+}
+
+// The part of the light that rays to its samples reach, of what is above the receiver's plane.
+float traced(CoverageReceiver r, vec3 horizon, bool whole) {
+    uvec2 wanted = uvec2(0u);
+    for (uint i = 0u; i < FOURS; ++i) {
+        uint bits = bits_of((whole ? vec4(1.0) : above_plane(horizon, i)) - 0.5);
+        wanted.x |= i < 8u ? bits << (4u * i & 31u) : 0u;
+        wanted.y |= i < 8u ? 0u : bits << (4u * i & 31u);
     }
-    return weight > 0.0 ? float(bitCount(seen.x) + bitCount(seen.y)) / weight : 1.0;
+    float weight = float(bitCount(wanted.x) + bitCount(wanted.y));
+    float hidden = hidden_samples(r, wanted, SOLID | CUTOUT, 0u);
+    return weight > 0.0 ? 1.0 - hidden / weight : 1.0;
 }
 
 // Samples of the light with the same number of layers before them.
@@ -208,8 +240,8 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     CoverageReceiver r = coverage_receiver(view.light, p, n, rounding_m);
     vec3 horizon = vec3(dot(n, r.axis_u), dot(n, r.axis_v), dot(n, r.center));
     bool whole = above >= 1.0;
-    if (LIGHT_SHAPE != LIGHT_SUN && through.cut.x != 0u) {
-        return above * traced(r, horizon, whole, tile, tiles);
+    if (edges_of(tile, tiles) > params.sizes.z || (LIGHT_SHAPE != LIGHT_SUN && through.cut.x != 0u)) {
+        return above * traced(r, horizon, whole);
     }
     bool center_above = horizon.z > 0.0;
     if (!center_above) {
@@ -243,8 +275,9 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     // the samples may have fewer still, or rounding has taken a layer too many off one sample.
     bool known = center_seen && fewest == 0.0;
     bool again = whole && fewest == 0.0 && found.lighter > 0.0;
+    uint steps = 0u;
     for (uint i = 0u; i < MOST_RAYS && !known; ++i) {
-        known = !ray_is_blocked(p, to_light_place(r, target), sun, params.counts.z, rounding_m);
+        known = !ray_is_blocked(p, to_light_place(r, target), sun, params.counts.z, rounding_m, SOLID, steps);
         if (!known && center_seen) {
             fewest = 0.0;
             known = true;
@@ -292,9 +325,13 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     }
     float cut_away = 0.0;
     if (MASKED != 0u) {
-        int before = bitCount(seen.x) + bitCount(seen.y);
-        add_cutouts(tile, tiles, r, seen);
-        cut_away = float(before - bitCount(seen.x) - bitCount(seen.y));
+        if (cutouts_of(tile, tiles) > MOST_CUTOUTS) {
+            cut_away = hidden_samples(r, seen, CUTOUT, steps);
+        } else {
+            int before = bitCount(seen.x) + bitCount(seen.y);
+            add_cutouts(tile, tiles, r, seen);
+            cut_away = float(before - bitCount(seen.x) - bitCount(seen.y));
+        }
     }
     if (!whole) {
         return above * (weight > 0.0 ? 1.0 - (hidden + cut_away) / weight : 1.0);

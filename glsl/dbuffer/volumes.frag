@@ -119,9 +119,9 @@ void main() {
         // What closes the volume counts only where there is no quad.
         depth = entry.z == QUAD ? 0.5 * depth : 0.5 + 0.4999 * depth;
     }
-    if (entry.z == FACE) {
+    if (entry.z == FACE && push.greatest != 0u) {
         // Only where there is no surface.
-        depth = push.greatest != 0u ? 0.99999994 : 1.0e-20;
+        depth = 0.99999994;
     }
     if (push.layer > 0u) {
         float last = texelFetch(before, ivec2(gl_FragCoord.xy), 0).x;

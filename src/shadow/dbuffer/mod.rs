@@ -19,7 +19,7 @@
 //! | `start`, `tiles`, `shafts` | tiles that some of the light is above, what is between both |
 //! | `lists` | the edges of each tile |
 //! | `cutouts` | its triangles with holes, if the scene has any: these hide samples of the light |
-//! | `through` | whether a surface cuts through the light: then rays to samples of it decide |
+//! | `through` | whether a surface cuts through the light: then rays to samples of it decide, as in tiles with very many edges |
 //! | `settle` | tiles without edges; a list of the others |
 //! | `visibility` | visibility of the others |
 
@@ -99,7 +99,7 @@ pub(super) fn add_passes<'f>(
             sizes.chunks,
         ],
         samples: samples::texels(options.samples, matches!(shape, LightShape::Rect { .. })),
-        sizes: [sizes.blocks, sizes.lists, 0, 0],
+        sizes: [sizes.blocks, sizes.lists, options.most_edges, 0],
     };
     let params = add_uniform(
         graph,

@@ -43,6 +43,9 @@ pub struct DbufferOptions {
     /// Edges a tile that lists have room for on average, 0 to 4096. What finds no room is looked for
     /// in the whole list of silhouettes, which costs time. For [`Buffer::Lists`].
     pub room: u32,
+    /// Most edges of a tile, 0 to 2048: receivers of tiles with more send rays to the samples, so that
+    /// loops stay shorter than software drivers let them be. For [`Buffer::Lists`].
+    pub most_edges: u32,
     /// Where edges come from.
     pub buffer: Buffer,
     /// Which surface a texel of the buffer keeps.
@@ -89,6 +92,7 @@ impl DbufferOptions {
     pub const DEFAULT: Self = Self {
         samples: 32,
         room: 256,
+        most_edges: 2048,
         buffer: Buffer::Lists,
         keep: Keep::Nearest,
         layers: 1,
@@ -110,6 +114,12 @@ impl DbufferOptions {
             "256",
             "0 to 4096",
             "edges a tile that lists have room for; the rest is looked for among all",
+        ),
+        TechniqueOption::new(
+            "most-edges",
+            "2048",
+            "0 to 2048",
+            "edges of a tile; where there are more, rays are sent to the samples instead",
         ),
         TechniqueOption::new(
             "buffer",
@@ -154,6 +164,7 @@ impl DbufferOptions {
         vec![
             self.samples.to_string(),
             self.room.to_string(),
+            self.most_edges.to_string(),
             name_of(&BUFFERS, self.buffer),
             name_of(&KEEPS, self.keep),
             self.layers.to_string(),
@@ -169,6 +180,7 @@ impl DbufferOptions {
         match option {
             "samples" => self.samples = number.filter(|n| matches!(n, 32 | 64))?,
             "room" => self.room = number.filter(|n| *n <= 4096)?,
+            "most-edges" => self.most_edges = number.filter(|n| *n <= 2048)?,
             "buffer" => self.buffer = named(&BUFFERS, value)?,
             "keep" => self.keep = named(&KEEPS, value)?,
             "layers" => self.layers = number.filter(|n| (1..=4).contains(n))?,

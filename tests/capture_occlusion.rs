@@ -405,14 +405,21 @@ fn a_larger_light_costs_no_more() {
             primitives.push(plate("bar", [x, x + 0.05], [-20.0, 20.0], depth));
         }
     }
-    let fetches = |half: f32| -> Vec<f32> {
+    let images = |half: f32| {
         let scene = scene(primitives.clone(), square(half));
-        render(&scene, &["show=fetches"]).remove(0)
+        let shown = ["show=fetches", "show=fetches,early=off", "", "early=off"];
+        render(&scene, &shown)
     };
-    let once = fetches(1.0);
-    assert!(once.iter().all(|v| *v > 0.0));
+    let once = images(1.0);
+    assert!(once[0].iter().all(|v| *v > 0.0));
     for half in [2.0, 4.0] {
-        assert!(once == fetches(half), "half width {half}");
+        let more = images(half);
+        assert!(once[0] == more[0], "half width {half}");
+        assert!(once[1] == more[1], "half width {half}, nothing left out");
+        // What is left out would add nothing.
+        let pairs = more[2].iter().zip(&more[3]);
+        let most = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(most < 2.0e-6, "{most}");
     }
 }
 

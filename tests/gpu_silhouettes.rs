@@ -158,7 +158,6 @@ fn found(scene: &Scene, light: AreaLight, rule: SilhouetteRule) -> Vec<Edge> {
         light_name: "lamp".to_string(),
         light,
         camera: PixelCamera::new(&camera, size),
-        scene_camera: camera.clone(),
         gbuffer,
         tile_bounds,
         view_params: (

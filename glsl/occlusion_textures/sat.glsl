@@ -53,11 +53,11 @@ vec2 row_sum(Row a, Row b, vec2 fractions, Sums sums, out vec2 most) {
     return whole + more * fractions.y - less * fractions.x;
 }
 
-// Sums of two groups of a layer over a box; low and high in texels, 0 to side. Where nothing in the
-// texels that the box touches counts, most of it is not looked at and both are 0: where both groups
-// have nothing, and for `by_difference` also where they have the same.
+// Sums of two groups of a layer over a box; low and high in texels, 0 to side. If `early`, where
+// nothing in the texels that the box touches counts, most of it is not looked at and both are 0: where
+// both groups have nothing, and for `by_difference` also where they have the same.
 vec2 box_sums(usampler2DArray tables, int layer, Sums sums, vec2 low, vec2 high, float side,
-    bool by_difference, inout float fetched) {
+    bool early, bool by_difference, inout float fetched) {
     vec2 first = min(floor(low), side - 1.0);
     vec2 last = min(floor(high), side - 1.0);
     vec2 before = low - first;
@@ -70,7 +70,7 @@ vec2 box_sums(usampler2DArray tables, int layer, Sums sums, vec2 low, vec2 high,
     uvec2 bottom_right = table_sums(tables, to.x + 1, to.y + 1, layer, sums);
     uvec2 outer = (bottom_right - bottom_left - top_right + top_left) >> sums.shift & sums.mask;
     fetched += 4.0;
-    if (outer.x == outer.y && (by_difference || outer.y == 0u)) {
+    if (early && outer.x == outer.y && (by_difference || outer.y == 0u)) {
         return vec2(0.0);
     }
     fetched += 12.0;

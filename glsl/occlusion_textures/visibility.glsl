@@ -23,6 +23,7 @@ layout(constant_id = 6) const float ROUND_KERNEL = 1.0; // half side of the squa
 
 layout(constant_id = 7) const uint CONTACT = 4u;    // rays of the test within a group; 0: none
 layout(constant_id = 8) const uint FINE = 64u;      // fine slices
+layout(constant_id = 13) const uint EARLY = 1u;     // leave out what can add nothing
 layout(constant_id = 12) const uint COUNT = 0u;     // show what filters fetch, in 1024, instead
 
 const uint COMBINE_PRODUCT = 0u;
@@ -208,7 +209,7 @@ float through_slices(Receiver at) {
     vec2 low = min(first.low, own.low);
     vec2 high = max(first.high, own.high);
     uvec4 present = slices_in_box(low, high);
-    if (present == uvec4(0u) || is_empty(low, high)) {
+    if (EARLY != 0u && (present == uvec4(0u) || is_empty(low, high))) {
         return 1.0;
     }
     bool with_rays = CONTACT > 0u && FINE > count;
@@ -222,7 +223,7 @@ float through_slices(Receiver at) {
         if (fine_plane(groups.spans[group].x) >= at.v.z) {
             break;
         }
-        if ((present & groups.masks[group]) == uvec4(0u)) {
+        if (EARLY != 0u && (present & groups.masks[group]) == uvec4(0u)) {
             continue;
         }
         // The receiver's own surface must not count where texels are too coarse to tell it from a
@@ -242,7 +243,7 @@ float through_slices(Receiver at) {
         }
         // All between the light and the receiver is a long strip where the light shines in flat: most
         // groups hold something there and nothing in their own kernel.
-        if (!may_block(group, kernel)) {
+        if (EARLY != 0u && !may_block(group, kernel)) {
             continue;
         }
         vec2 mean = blocked(group, kernel);
@@ -263,7 +264,7 @@ float through_slices(Receiver at) {
         } else {
             product *= 1.0 - fade * mean.x;
         }
-        if (product <= 0.0) {
+        if (EARLY != 0u && product <= 0.0) {
             break;
         }
     }

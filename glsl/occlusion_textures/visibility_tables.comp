@@ -28,7 +28,7 @@ vec2 means_over(uint table, uvec2 group, Kernel kernel, bool by_difference) {
     vec2 size = (kernel.high - kernel.low) * DETAIL;
     Sums sums = sums_of(group, PACKED != 0u);
     vec2 blocked_texels = box_sums(tables, int(table), sums, clamp(kernel.low, 0.0, side),
-        clamp(kernel.high, 0.0, side), side, by_difference, fetched);
+        clamp(kernel.high, 0.0, side), side, EARLY != 0u, by_difference, fetched);
     // What is all blocked must not let rounding through.
     return clamp(blocked_texels * (1.0 + 4.0e-6) / (size.x * size.y), 0.0, 1.0);
 }

@@ -19,6 +19,7 @@ mod scene_buffers;
 mod scene_layout;
 mod tight_box;
 mod tiles;
+mod uploads;
 mod visible;
 
 pub use camera::{PixelCamera, frustum_sees};

@@ -5,12 +5,10 @@ use super::cover::Cover;
 use super::hierarchy;
 use super::neighbours::neighbours;
 use super::scene_layout::{IMAGE_WIDTH, Layout, Vertex};
-use crate::gpu::{
-    Buffer, Gpu, GpuError, Image, ImageSpec, MemoryLocation, OptionalFeatures, Retired,
-};
+use super::uploads::{STATIC, record_uploads, upload_buffer, upload_images};
+use crate::gpu::{Buffer, Gpu, GpuError, Image, MemoryLocation, OptionalFeatures, Retired};
 use crate::graph::{
-    Access, BufferDesc, BufferId, BufferState, FrameCache, Graph, GraphError, HostBuffer,
-    HostImage, ImageDesc, ImageId, ImagePart, ImageState, PassKind,
+    BufferDesc, BufferId, BufferState, Graph, GraphError, HostBuffer, HostImage, ImageDesc, ImageId,
 };
 use crate::scene::{Aabb, Scene};
 use ash::vk;
@@ -540,14 +538,6 @@ impl SceneBuffers {
     }
 }
 
-/// State of the scene's images between frames: the upload made them visible to every stage that
-/// reads them, and nobody writes them, so nobody waits.
-const STATIC: ImageState = ImageState {
-    layout: vk::ImageLayout::READ_ONLY_OPTIMAL,
-    stages: vk::PipelineStageFlags2::NONE,
-    access: vk::AccessFlags2::NONE,
-};
-
 impl Sizes {
     fn set_edges(&mut self, adjacency: &Adjacency) {
         self.images[EDGES] = image_of(self.images[EDGES].format, adjacency.edges.len());
@@ -560,149 +550,4 @@ fn image_of(format: vk::Format, texels: usize) -> ImageDesc {
     // Nothing to hold: a single texel, so that there is something to bind.
     let width = if texels == 0 { 1 } else { IMAGE_WIDTH as u32 };
     ImageDesc::new(format, width, rows)
-}
-
-/// Records the copies that `declare` declares.
-fn record_uploads(
-    gpu: &mut Gpu,
-    cmd: vk::CommandBuffer,
-    declare: impl FnOnce(&mut Gpu, &mut Graph<'_>) -> Result<(), GpuError>,
-) -> Result<(), UploadError> {
-    let mut graph = Graph::new();
-    declare(gpu, &mut graph)?;
-    let compiled = graph.compile(gpu)?;
-    let mut cache = FrameCache::new();
-    let recorded = compiled.record(gpu, &mut cache, cmd);
-    cache.destroy(gpu);
-    recorded?;
-    Ok(())
-}
-
-fn upload_images(
-    gpu: &mut Gpu,
-    graph: &mut Graph<'_>,
-    contents: &[(&str, &[u8])],
-    descs: &[ImageDesc],
-    staging: &mut Vec<Buffer>,
-    made: &mut Vec<Image>,
-) -> Result<(), GpuError> {
-    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-    for ((name, bytes), desc) in contents.iter().zip(descs) {
-        let spec = ImageSpec::new_2d(desc.format, desc.width, desc.height, usage);
-        let image = gpu.create_image(name, &spec)?;
-        let uploaded = upload_image(gpu, graph, &image, *desc, bytes, staging);
-        made.push(image);
-        uploaded?;
-    }
-    Ok(())
-}
-
-/// Brings `bytes`, filled up with zeros to `size`, to a buffer that copies can be made from.
-fn stage(
-    gpu: &mut Gpu,
-    graph: &mut Graph<'_>,
-    bytes: &[u8],
-    size: usize,
-    staging: &mut Vec<Buffer>,
-) -> Result<Option<BufferId>, GpuError> {
-    if size == 0 {
-        return Ok(None);
-    }
-    let size = size as u64;
-    let usage = vk::BufferUsageFlags::TRANSFER_SRC;
-    let mut buffer = gpu.create_buffer("upload", size, usage, MemoryLocation::CpuToGpu)?;
-    let mapped = buffer.mapped_mut().map(|target| {
-        let (data, padding) = target.split_at_mut(bytes.len());
-        data.copy_from_slice(bytes);
-        padding.fill(0);
-    });
-    let raw = buffer.raw;
-    staging.push(buffer);
-    if mapped.is_none() {
-        return Err(GpuError::Invalid {
-            object: "upload".to_string(),
-            problem: "its memory is not visible to the host".to_string(),
-        });
-    }
-    let host = HostBuffer {
-        buffer: raw,
-        desc: BufferDesc { size },
-        usage,
-        enter: BufferState::IDLE,
-        leave: BufferState::IDLE,
-    };
-    Ok(Some(graph.import_buffer("upload", host)))
-}
-
-fn upload_buffer(
-    gpu: &mut Gpu,
-    graph: &mut Graph<'_>,
-    target: &Buffer,
-    bytes: &[u8],
-    staging: &mut Vec<Buffer>,
-) -> Result<(), GpuError> {
-    let size = bytes.len() as u64;
-    let Some(source) = stage(gpu, graph, bytes, bytes.len(), staging)? else {
-        return Ok(());
-    };
-    let host = HostBuffer {
-        buffer: target.raw,
-        desc: BufferDesc { size: target.size },
-        usage: target.usage,
-        enter: BufferState::IDLE,
-        leave: BufferState {
-            stages: vk::PipelineStageFlags2::VERTEX_INPUT,
-            access: vk::AccessFlags2::from_raw(
-                vk::AccessFlags2::VERTEX_ATTRIBUTE_READ.as_raw()
-                    | vk::AccessFlags2::INDEX_READ.as_raw(),
-            ),
-        },
-    };
-    let target = graph.import_buffer("scene", host);
-    let mut pass = graph.pass("upload", PassKind::Transfer);
-    pass.read(source, Access::CopyRead);
-    let target = pass.write(target, Access::CopyWrite);
-    pass.record(move |ctx| ctx.copy_buffer(source, 0, target, 0, size));
-    Ok(())
-}
-
-fn upload_image(
-    gpu: &mut Gpu,
-    graph: &mut Graph<'_>,
-    target: &Image,
-    desc: ImageDesc,
-    texels: &[u8],
-    staging: &mut Vec<Buffer>,
-) -> Result<(), GpuError> {
-    let texel_bytes = if desc.format == vk::Format::R8G8B8A8_SRGB {
-        4
-    } else {
-        16
-    };
-    let size = desc.width as usize * desc.height as usize * texel_bytes;
-    let Some(source) = stage(gpu, graph, texels, size, staging)? else {
-        return Ok(());
-    };
-    let host = HostImage {
-        image: target.raw,
-        desc,
-        usage: target.spec.usage,
-        enter: ImageState::UNDEFINED,
-        leave: ImageState {
-            stages: vk::PipelineStageFlags2::from_raw(
-                vk::PipelineStageFlags2::VERTEX_SHADER.as_raw()
-                    | vk::PipelineStageFlags2::FRAGMENT_SHADER.as_raw()
-                    | vk::PipelineStageFlags2::COMPUTE_SHADER.as_raw(),
-            ),
-            access: vk::AccessFlags2::SHADER_SAMPLED_READ,
-            ..STATIC
-        },
-    };
-    let target = graph.import_image("scene", host);
-    let mut pass = graph.pass("upload", PassKind::Transfer);
-    pass.read(source, Access::CopyRead);
-    let target = pass.overwrite(target, Access::CopyWrite);
-    let part = ImagePart::whole(&desc);
-    pass.record(move |ctx| ctx.copy_buffer_to_image(source, 0, target, part));
-    Ok(())
 }

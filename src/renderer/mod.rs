@@ -108,7 +108,6 @@ fn visibilities<'f>(
                 light_name: light.name.clone(),
                 light: light.light,
                 camera: pixels,
-                scene_camera: camera.clone(),
                 gbuffer,
                 tile_bounds,
                 view_params: (params, *part),

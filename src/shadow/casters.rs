@@ -15,13 +15,17 @@ pub fn casters(light: &AreaLight, receivers: &[Vec<DVec3>], scene: &SceneBuffers
     can_block(light, receivers, &boxes).into()
 }
 
-/// For each box (eight corners in scene space, metres, x changing fastest, then y) whether what is in it can block any part
-/// of the light from any point of the receivers' convex hulls. It cannot where the light and all
-/// receivers lie on the outer side of a face of the box: neither does flat ground shadow itself or
-/// what stands on it, nor a wall the room that it closes.
+/// For each box (eight corners in scene space, metres, x changing fastest, then y) whether what is in
+/// it can block any part of the light from any point of the receivers' convex hulls. It cannot where
+/// the light and all receivers lie on the outer side of a face of the box: neither does flat ground
+/// shadow itself or what stands on it, nor a wall the room that it closes.
 ///
 /// Never wrong about what it rules out; what it leaves may still block nothing.
-pub fn can_block(light: &AreaLight, receivers: &[Vec<DVec3>], boxes: &[[Vec3; 8]]) -> Vec<bool> {
+pub(super) fn can_block(
+    light: &AreaLight,
+    receivers: &[Vec<DVec3>],
+    boxes: &[[Vec3; 8]],
+) -> Vec<bool> {
     let largest = |corners: &[Vec3; 8]| {
         corners
             .iter()

@@ -65,7 +65,7 @@ pub(super) fn add_hard<'f>(
 
     let buffer = add_uniform(graph, format!("{technique}.params {name}"), params);
 
-    let maps = add_maps(graph, inputs, technique, &views, DrawTarget::Ids);
+    let maps = add_maps(graph, inputs, technique, &views, DrawTarget::Ids, MAP_SIZE);
     let receivers = add_receivers_in(graph, inputs, technique, 0.0, image);
     let ShadowMap {
         depth: map_depth,

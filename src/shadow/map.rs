@@ -19,20 +19,9 @@ pub(super) struct ShadowMap {
     pub ids: Option<ImageId>,
 }
 
-/// Declares one pass for each view. A light without views gets single texels that are cleared and
-/// never read, so that shaders have something bound.
+/// Declares one pass for each view, of this width and height in texels. A light without views gets
+/// single texels that are cleared and never read, so that shaders have something bound.
 pub(super) fn add_maps<'f>(
-    graph: &mut Graph<'f>,
-    inputs: &ShadowInputs<'f>,
-    technique: &str,
-    views: &LightViews,
-    target: DrawTarget,
-) -> ShadowMap {
-    add_maps_of_size(graph, inputs, technique, views, target, MAP_SIZE)
-}
-
-/// As [`add_maps`], of another width and height in texels.
-pub(super) fn add_maps_of_size<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
     technique: &str,
@@ -44,7 +33,7 @@ pub(super) fn add_maps_of_size<'f>(
     add_maps_of(graph, inputs, technique, views, target, (size, casters))
 }
 
-/// As [`add_maps_of_size`], of those of the scene's draws that are asked for.
+/// As [`add_maps`], of those of the scene's draws that are asked for.
 pub(super) fn add_maps_of<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,

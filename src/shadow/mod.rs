@@ -18,7 +18,7 @@ mod technique;
 mod unblocked;
 mod uniform;
 
-pub use casters::{can_block, casters};
+pub(crate) use casters::casters;
 pub use light_params::{LightParams, ViewParams, shape_number};
 pub use light_view::{LightView, LightViews, light_views};
 pub use map::MAP_SIZE;
@@ -27,7 +27,6 @@ pub use technique::{Technique, TechniqueError, TechniqueOption};
 use crate::geometry::{GBuffer, PixelCamera, SceneBuffers, SceneIds};
 use crate::graph::{BufferId, BufferPart, ImageId};
 use crate::light::AreaLight;
-use crate::scene::SceneCamera;
 use glam::DVec3;
 use silhouettes::Silhouettes;
 use std::rc::Rc;
@@ -40,8 +39,6 @@ pub struct ShadowInputs<'f> {
     pub light: AreaLight,
     /// Camera of the picture.
     pub camera: PixelCamera,
-    /// The same, for hulls of what it can see: [`crate::geometry::visible_hulls`].
-    pub scene_camera: SceneCamera,
     /// The surface at each pixel.
     pub gbuffer: GBuffer,
     /// Bounds of the surfaces in each tile: [`crate::geometry::add_tile_bounds`].

@@ -96,7 +96,15 @@ pub(super) fn add_passes<'f>(
 
     let buffer = add_uniform(graph, format!("{technique}.params {name}"), params);
 
-    let map = add_maps(graph, inputs, technique, &views, DrawTarget::Depth).depth;
+    let map = add_maps(
+        graph,
+        inputs,
+        technique,
+        &views,
+        DrawTarget::Depth,
+        MAP_SIZE,
+    )
+    .depth;
     let receivers = add_receivers(graph, inputs, technique, reach as f32);
     let list = receivers.list;
     let gbuffer = inputs.gbuffer;

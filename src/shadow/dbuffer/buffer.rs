@@ -21,7 +21,7 @@ use crate::graph::{
     Access, Bind, BufferId, Graph, ImageDesc, ImageId, ImagePart, Load, PassKind, Stage,
 };
 use crate::shadow::light_view::{LightView, LightViews, MAX_LIGHT_VIEWS, light_views};
-use crate::shadow::map::{ShadowMap, add_maps_of_size};
+use crate::shadow::map::{ShadowMap, add_maps};
 use crate::shadow::receivers::add_receivers;
 use crate::shadow::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
 use crate::shadow::uniform::add_uniform;
@@ -136,7 +136,7 @@ pub(super) fn add_buffer<'f>(
     let params = add_uniform(graph, format!("{NAME}.views {name}"), params);
     let coverage = add_uniform(graph, format!("{NAME}.params {name}"), coverage);
     let target = DrawTarget::Ids;
-    let map = add_maps_of_size(graph, inputs, NAME, &views, target, options.resolution);
+    let map = add_maps(graph, inputs, NAME, &views, target, options.resolution);
     let ShadowMap { ids: Some(map), .. } = map else {
         unreachable!("triangle numbers were asked for");
     };

@@ -149,7 +149,6 @@ fn lit_by<'f>(
         light_name: inputs.light_name.clone(),
         light,
         camera: inputs.camera,
-        scene_camera: inputs.scene_camera.clone(),
         gbuffer: inputs.gbuffer,
         tile_bounds: inputs.tile_bounds,
         view_params: (buffer, BufferPart { offset: 0, size }),

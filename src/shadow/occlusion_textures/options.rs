@@ -87,7 +87,7 @@ pub struct OcclusionOptions {
     pub projection: Projection,
     /// What the slices are spent on.
     pub fit: Fit,
-    /// Texels across the slices' image, 64 to 4096, a power of two; `None`: by the picture's size.
+    /// Texels across the slices' image, 64 to 4096, a power of two; `None`: by the largest kernel.
     pub resolution: Option<u32>,
     /// Texels of it across one of the filtered textures, 1, 2, 4 or 8; `None`: by the size of kernels.
     pub detail: Option<u32>,
@@ -95,6 +95,8 @@ pub struct OcclusionOptions {
     pub middle: bool,
     /// Rays of the test for blockers near the receiver, 0 to 64; it needs [`Fit::Occupied`].
     pub contact: u32,
+    /// Leave out textures that hold nothing, or add nothing, within a kernel.
+    pub early: bool,
     /// Make an image of the work instead: texture accesses of filters at each pixel, in 1024ths.
     pub count_fetches: bool,
 }
@@ -112,6 +114,7 @@ impl OcclusionOptions {
         detail: None,
         middle: true,
         contact: 8,
+        early: true,
         count_fetches: false,
     };
 
@@ -152,7 +155,7 @@ impl OcclusionOptions {
         TechniqueOption::new(
             "resolution",
             "auto",
-            "64 to 4096, a power of two, or auto (8 times the picture's longer side, 512 to 2048)",
+            "64 to 4096, a power of two, or auto (280 for the largest kernel, 512 to 2048)",
             "texels across the slices",
         ),
         TechniqueOption::new(
@@ -172,6 +175,12 @@ impl OcclusionOptions {
             "8",
             "0 to 64",
             "rays of the test for blockers near the receiver",
+        ),
+        TechniqueOption::new(
+            "early",
+            "on",
+            "on or off",
+            "whether textures that can add nothing to a pixel are left out",
         ),
         TechniqueOption::new(
             "show",
@@ -224,6 +233,7 @@ impl OcclusionOptions {
                 .map_or("auto".to_string(), |texels| texels.to_string()),
             if self.middle { "middle" } else { "lower" }.to_string(),
             self.contact.to_string(),
+            if self.early { "on" } else { "off" }.to_string(),
             if self.count_fetches {
                 "fetches"
             } else {
@@ -297,6 +307,13 @@ impl OcclusionOptions {
                 }
             }
             "contact" => self.contact = number(0..=64)?,
+            "early" => {
+                self.early = match value {
+                    "on" => true,
+                    "off" => false,
+                    _ => return None,
+                }
+            }
             "show" => {
                 self.count_fetches = match value {
                     "visibility" => false,

@@ -64,6 +64,7 @@ pub(super) fn add_visibility<'f>(
         (7, options.contact),
         (8, options.fine_slices()),
         (12, u32::from(options.count_fetches)),
+        (13, u32::from(options.early)),
     ];
     let (shader, sampler) = match options.filter {
         Filter::SummedAreas => {

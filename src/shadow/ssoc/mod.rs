@@ -38,7 +38,7 @@ pub(super) use crowding::remark;
 pub use options::{Combine, SsocOptions};
 
 use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
-use super::map::{ShadowMap, add_maps_of_size};
+use super::map::{ShadowMap, add_maps};
 use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
 use super::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
@@ -137,7 +137,7 @@ pub(super) fn add_passes<'f>(
         params,
     );
     let target = DrawTarget::Ids;
-    let map = add_maps_of_size(graph, inputs, NAME, &views, target, options.resolution);
+    let map = add_maps(graph, inputs, NAME, &views, target, options.resolution);
     let ShadowMap {
         depth,
         ids: Some(ids),

@@ -1,6 +1,6 @@
 use super::*;
 use crate::scene::Aabb;
-use crate::shadow::can_block;
+use crate::shadow::casters::can_block;
 use glam::{Vec3, Vec4};
 
 fn light(shape: LightShape) -> AreaLight {

@@ -529,6 +529,58 @@ fn rays_do_for_edges() {
     assert!(found[0].0 <= 0.01 && found[1].0 <= 0.02 && found[1] != found[0]);
 }
 
+/// Silhouettes depend on light and casters alone: a camera that moves does not search for them anew,
+/// and its pictures are the same as with a new list. Neither does a rectangle that counts as a disk.
+#[test]
+fn silhouettes_are_kept_while_light_and_caster_stand_still() {
+    let _one = support::serial();
+    let plates = [(3.0, [-0.2, 0.1], ENDLESS), (5.0, ENDLESS, [-0.3, 0.2])];
+    let square = LightShape::Rect {
+        width: 1.0,
+        height: 1.0,
+    };
+    let still = under(&plates, square);
+    let mut renderer = FrameRenderer::owning(support::gpu(), still.clone()).unwrap();
+    let searches = |names: &[String]| names.iter().filter(|n| n.contains("silhouettes.")).count();
+    for technique in ["dbuffer", "dbuffer:light=disk", EDGES] {
+        let mut request = FrameRequest {
+            camera: camera(),
+            size: [SIZE; 2],
+            lights: vec![0],
+            technique: technique.parse().unwrap(),
+        };
+        let first = renderer.render_static(&request).unwrap();
+        assert_eq!(searches(&first.report.passes), 3, "{technique}");
+        request.camera.position.x += 0.1;
+        let moved = renderer.render_static(&request).unwrap();
+        assert_eq!(searches(&moved.report.passes), 0, "{technique}");
+        let kept = ["masks_kept", "silhouettes_kept"].map(|name| moved.counters[name]);
+        assert_eq!(kept, [0, 1], "{technique}");
+        let anew = renderer.render(&request).unwrap();
+        assert_eq!(searches(&anew.report.passes), 3, "{technique}");
+        assert!(
+            moved.lights[0].visibility == anew.lights[0].visibility,
+            "{technique}"
+        );
+        assert!(
+            moved.lights[0].visibility != first.lights[0].visibility,
+            "{technique}"
+        );
+    }
+    let mut other = still;
+    other.lights[0].light.center.x += 0.3;
+    renderer.set_scene(other).unwrap();
+    let request = FrameRequest {
+        camera: camera(),
+        size: [SIZE; 2],
+        lights: vec![0],
+        technique: EDGES.parse().unwrap(),
+    };
+    let elsewhere = renderer.render_static(&request).unwrap();
+    assert_eq!(searches(&elsewhere.report.passes), 3);
+    support::assert_no_messages(&renderer.destroy().unwrap());
+}
+
 #[test]
 fn a_light_of_no_size_is_hard_and_nothing_is_full_light() {
     let _one = support::serial();

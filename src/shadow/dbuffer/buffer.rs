@@ -151,7 +151,12 @@ pub(super) fn add_buffer<'f>(
         umbra: drawn.add_surface(graph, inputs, options, true),
         penumbra: drawn.add_surface(graph, inputs, options, false),
     };
-    add_visibility(graph, inputs, options, [coverage, params], hard, &surfaces)
+    let visibility = add_visibility(graph, inputs, options, [coverage, params], hard, &surfaces);
+    // The images are not kept: views of a light cover what the camera sees.
+    ShadowMask {
+        silhouettes: Some(list),
+        ..ShadowMask::new(visibility)
+    }
 }
 
 impl Drawn<'_> {
@@ -273,7 +278,7 @@ fn add_visibility<'f>(
     [coverage, params]: [BufferId; 2],
     hard: ImageId,
     surfaces: &Surfaces,
-) -> ShadowMask {
+) -> ImageId {
     let name = &inputs.light_name;
     let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
     let (view_params, part) = inputs.view_params;
@@ -338,5 +343,5 @@ fn add_visibility<'f>(
         ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
         list.dispatch(ctx)
     });
-    ShadowMask::new(visibility)
+    visibility
 }

@@ -14,7 +14,7 @@
 //! |---|---|
 //! | `params` | places on the light |
 //! | `map`, `visibility` of `dbuffer.hard` | what sees the light's centre |
-//! | `silhouettes.*` | the list of edges ([`super::silhouettes`]) |
+//! | `silhouettes.*` | the list of edges ([`super::silhouettes`]), kept while light and casters stand still |
 //! | `boxes` | boxes around 16, 256 and 4096 of them |
 //! | `start`, `tiles`, `shafts` | tiles that some of the light is above, what is between both |
 //! | `lists` | the edges of each tile |
@@ -232,5 +232,8 @@ fn add_visibility<'f>(
         ctx.bind_compute(&pipeline, &bindings, &[])?;
         tiles.dispatch(ctx)
     });
-    ShadowMask::new(visibility)
+    ShadowMask {
+        silhouettes: Some(tools.silhouettes),
+        ..ShadowMask::new(visibility)
+    }
 }

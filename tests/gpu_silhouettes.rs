@@ -199,6 +199,7 @@ fn found(scene: &Scene, light: AreaLight, rule: SilhouetteRule) -> Vec<Edge> {
     let words: &[u32] = bytemuck::cast_slice(target.mapped().unwrap());
     let count = words[4];
     assert_eq!(words[..4], [6 * count, 1, 0, 0]);
+    assert_eq!(words[5..8], [count.div_ceil(64), count.min(1), 1]);
     let numbers = words[8..8 + count as usize].to_vec();
     assert!(numbers.windows(2).all(|two| two[0] < two[1]));
     assert!(numbers.iter().all(|n| (*n as usize) < edges));

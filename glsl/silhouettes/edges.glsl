@@ -7,6 +7,9 @@
 const uint NO_POINT = 0xffffffffu;
 const uint MORE_FACES = 0x80000000u;
 
+// Silhouettes that one row of workgroups covers, of a dispatch over a list of them.
+const uint SILHOUETTES_ROW = 64u * 32768u;
+
 uvec4 fetch_edge_texel(ivec2 place); // defined by the entry file
 vec4 fetch_point_texel(ivec2 place); // defined by the entry file
 

@@ -10,7 +10,7 @@ layout(set = 0, binding = 0, std430) readonly buffer Masks {
 layout(set = 0, binding = 1, std430) writeonly buffer Offsets {
     uint offsets[];
 };
-// VkDrawIndirectCommand, then the number of silhouettes.
+// VkDrawIndirectCommand, then the number of silhouettes, then VkDispatchIndirectCommand.
 layout(set = 0, binding = 2, std430) writeonly buffer Arguments {
     uint arguments[8];
 };
@@ -48,8 +48,11 @@ void main() {
         arguments[2] = 0u;
         arguments[3] = 0u;
         arguments[4] = at;
-        arguments[5] = 0u;
-        arguments[6] = 0u;
-        arguments[7] = 0u;
+        // 64 a workgroup, in rows of SILHOUETTES_ROW (silhouettes/edges.glsl).
+        const uint GROUPS = 32768u;
+        uint groups = (at + 63u) / 64u;
+        arguments[5] = min(groups, GROUPS);
+        arguments[6] = (groups + GROUPS - 1u) / GROUPS;
+        arguments[7] = 1u;
     }
 }

@@ -9,5 +9,5 @@ void main() {
     if (is_no_outline()) {
         discard;
     }
-    edge = entry;
+    edge = entry.x;
 }

@@ -4,13 +4,13 @@
 
 #include "ssoc/bands.glsl"
 
-layout(set = 0, binding = 7) uniform usampler2D first_layer;
+layout(set = 0, binding = 5) uniform usampler2D first_layer;
 
 layout(location = 0) out uint edge;
 
 void main() {
-    if (is_no_outline() || texelFetch(first_layer, ivec2(gl_FragCoord.xy), 0).x == entry) {
+    if (is_no_outline() || texelFetch(first_layer, ivec2(gl_FragCoord.xy), 0).x == entry.x) {
         discard;
     }
-    edge = entry;
+    edge = entry.x;
 }

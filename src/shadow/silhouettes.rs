@@ -37,7 +37,8 @@ pub enum SilhouetteRule {
 pub struct Silhouettes {
     /// R32_UINT, rows of 4096: numbers of edges, ascending.
     pub list: ImageId,
-    /// `VkDrawIndirectCommand` of one instance (four `u32`), then the number of edges in the list.
+    /// `VkDrawIndirectCommand` of one instance (four `u32`), the number of edges in the list, then
+    /// `VkDispatchIndirectCommand` of an invocation for each, 64 a workgroup in rows of 32768.
     pub arguments: BufferId,
 }
 
@@ -53,6 +54,12 @@ impl Silhouettes {
     /// Draws the bound pipeline's vertices for each edge.
     pub fn draw(&self, ctx: &mut PassContext<'_>) -> Result<(), GpuError> {
         ctx.draw_indirect(self.arguments, 0)
+    }
+
+    /// Dispatches the bound pipeline, of 64 invocations a workgroup, over the list. The pass reads
+    /// [`arguments`](Self::arguments) as [`Access::Indirect`].
+    pub fn dispatch(&self, ctx: &mut PassContext<'_>) -> Result<(), GpuError> {
+        ctx.dispatch_indirect(self.arguments, 20)
     }
 }
 

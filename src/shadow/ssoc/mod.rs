@@ -24,6 +24,7 @@
 //! | `params` | views |
 //! | `map` | depths and triangles seen from the light's centre |
 //! | `silhouettes.*` | the list of edges ([`super::silhouettes`]) |
+//! | `outlines` | where along each edge it is an outline |
 //! | `bands` | the outer and the inner distortion map of a view |
 //! | `bands_second` | with `layers=2`: what another edge was before there |
 //! | `start`, `tiles` | the picture's tiles that need work |
@@ -44,7 +45,7 @@ use super::receivers::add_receivers;
 use super::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
 use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, shape_number};
-use crate::geometry::DrawTarget;
+use crate::geometry::{DrawTarget, image_place};
 use crate::gpu::{ComputePipelineDesc, DepthState, GraphicsPipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
     Access, Bind, BufferId, Graph, ImageDesc, ImageId, ImagePart, Load, PassBuilder, PassKind,
@@ -148,11 +149,12 @@ pub(super) fn add_passes<'f>(
     let map = (depth, ids);
     let list = add_silhouettes(graph, inputs, NAME, SilhouetteRule::Center, VERTICES);
     let layers = views.views.len() as u32;
+    let outlines = add_outlines(graph, inputs, layers, buffer, map, list);
     let drawing = Bands {
         side: if layers == 0 { 1 } else { options.bands },
         layers,
         params: buffer,
-        map,
+        outlines,
         list,
     };
     let bands = drawing.add_maps(graph, inputs, None);
@@ -179,6 +181,58 @@ fn farthest(inputs: &ShadowInputs<'_>) -> f32 {
     points.map(|p| p.distance(center)).fold(0.0, f64::max) as f32
 }
 
+/// Where the light's centre is, of a sun the origin.
+fn origin(inputs: &ShadowInputs<'_>) -> [f32; 4] {
+    let sun = inputs.light.shape.is_sun();
+    let center = if sun { Vec3::ZERO } else { inputs.light.center };
+    center.extend(0.0).to_array()
+}
+
+/// Declares the pass that tells where along each edge it is an outline. `map`: depths, and numbers of
+/// triangles plus one.
+fn add_outlines(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    views: u32,
+    params: BufferId,
+    map: (ImageId, ImageId),
+    list: Silhouettes,
+) -> ImageId {
+    let name = &inputs.light_name;
+    let [width, height] = image_place(inputs.scene.edge_count());
+    let desc = ImageDesc::new(vk::Format::R32G32B32A32_UINT, width, height).layers(views.max(1));
+    let outlines = graph.create_image(format!("{NAME}.outlines {name}"), desc);
+    let (edges, points, triangles) = (inputs.ids.edges, inputs.ids.points, inputs.ids.triangles);
+    let (depths, ids) = map;
+    let mut pass = graph.pass(format!("{NAME}.outlines {name}"), PassKind::Compute);
+    pass.read(params, Access::Uniform(Stage::Compute));
+    pass.read(list.arguments, Access::Indirect);
+    pass.read(list.arguments, Access::Uniform(Stage::Compute));
+    for image in [list.list, edges, points, depths, ids, triangles] {
+        pass.read(image, Access::Sampled(Stage::Compute));
+    }
+    let outlines = pass.overwrite(outlines, Access::StorageWrite(Stage::Compute));
+    let push = origin(inputs);
+    pass.record(move |ctx| {
+        let nearest = SamplerDesc::nearest();
+        let bindings = [
+            Bind::uniform(0, params),
+            Bind::sampled(1, list.list, nearest),
+            Bind::sampled(2, edges, nearest),
+            Bind::sampled(3, points, nearest),
+            Bind::sampled(4, depths, nearest).array(),
+            Bind::sampled(5, ids, nearest).array(),
+            Bind::sampled(6, triangles, nearest),
+            Bind::uniform(7, list.arguments),
+            Bind::storage_image(8, outlines).array(),
+        ];
+        let pipeline = ComputePipelineDesc::new(&spirv::SSOC_OUTLINES_COMP);
+        ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
+        list.dispatch(ctx)
+    });
+    outlines
+}
+
 /// What bands are drawn of, and where to.
 #[derive(Clone, Copy)]
 struct Bands {
@@ -187,8 +241,8 @@ struct Bands {
     /// Views, each with an outer and an inner map.
     layers: u32,
     params: BufferId,
-    /// Depths, and numbers of triangles plus one.
-    map: (ImageId, ImageId),
+    /// RGBA32_UINT, as the list of edges, a layer for each view: a bit for each place along an edge.
+    outlines: ImageId,
     list: Silhouettes,
 }
 
@@ -247,28 +301,21 @@ impl Bands {
         first: Option<ImageId>,
     ) {
         let Self {
-            params, map, list, ..
+            params,
+            outlines,
+            list,
+            ..
         } = *self;
-        let center = if inputs.light.shape.is_sun() {
-            Vec3::ZERO
-        } else {
-            inputs.light.center
-        };
         let push = BandsPush {
-            center: center.extend(0.0).to_array(),
+            center: origin(inputs),
             view: layer / 2,
             side: layer % 2,
         };
         let (edges, points) = (inputs.ids.edges, inputs.ids.points);
-        let (depths, ids) = map;
-        let triangles = inputs.ids.triangles;
         let seen = ImagePart::layer(layer / 2);
         list.read(&mut pass, inputs);
         pass.read(params, Access::Uniform(Stage::Vertex));
-        pass.read(params, Access::Uniform(Stage::Fragment));
-        pass.read_part(depths, seen, Access::Sampled(Stage::Fragment));
-        pass.read_part(ids, seen, Access::Sampled(Stage::Fragment));
-        pass.read(triangles, Access::Sampled(Stage::Fragment));
+        pass.read_part(outlines, seen, Access::Sampled(Stage::Vertex));
         let own = ImagePart::layer(layer);
         if let Some(first) = first {
             pass.read_part(first, own, Access::Sampled(Stage::Fragment));
@@ -280,11 +327,9 @@ impl Bands {
                 Bind::sampled(1, list.list, nearest),
                 Bind::sampled(2, edges, nearest),
                 Bind::sampled(3, points, nearest),
-                Bind::sampled(4, depths, nearest).part(seen),
-                Bind::sampled(5, ids, nearest).part(seen),
-                Bind::sampled(6, triangles, nearest),
+                Bind::sampled(4, outlines, nearest).part(seen),
             ];
-            bindings.extend(first.map(|first| Bind::sampled(7, first, nearest).part(own)));
+            bindings.extend(first.map(|first| Bind::sampled(5, first, nearest).part(own)));
             ctx.bind_graphics(pipeline.clone(), &bindings, bytemuck::bytes_of(&push))?;
             list.draw(ctx)
         });

@@ -39,7 +39,7 @@ pub(super) use crowding::remark;
 pub use options::{Combine, SsocOptions};
 
 use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
-use super::map::{ShadowMap, add_maps};
+use super::map::{ShadowMap, add_maps_of};
 use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
 use super::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
@@ -55,6 +55,7 @@ use crate::light::ShapeKind;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
+use std::rc::Rc;
 
 /// The technique's name.
 pub(super) const NAME: &str = "ssoc";
@@ -138,7 +139,10 @@ pub(super) fn add_passes<'f>(
         params,
     );
     let target = DrawTarget::Ids;
-    let map = add_maps(graph, inputs, NAME, &views, target, options.resolution);
+    // What cannot block is drawn too: a body's edge on the floor that it stands on is no outline.
+    let all: Rc<[bool]> = vec![true; inputs.scene.draws().len()].into();
+    let drawn = (options.resolution, all);
+    let map = add_maps_of(graph, inputs, NAME, &views, target, drawn);
     let ShadowMap {
         depth,
         ids: Some(ids),

@@ -200,7 +200,7 @@ float pixel_visibility(uvec2 pixel) {
     if (dbuffer.counts.x == 0u || any(notEqual(at.xy, clamp(at.xy, 0.0, 1.0)))) {
         return min(result, above);
     }
-    vec3 extent = max(abs(p), sun ? vec3(0.0) : abs(view.light.center.xyz));
+    vec3 extent = max(max(abs(p), abs(view.camera.eye.xyz)), sun ? vec3(0.0) : abs(view.light.center.xyz));
     float rounding_m = POSITION_ROUNDING * max(extent.x, max(extent.y, extent.z));
     CoverageReceiver r = coverage_receiver(view.light, p, n, rounding_m);
     float distance = sun ? dot(p, dbuffer.axis_z.xyz) - dbuffer.axis_y.w : length(offset);

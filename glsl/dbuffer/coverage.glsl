@@ -40,13 +40,21 @@ struct CoverageReceiver {
 };
 
 struct Coverage {
-    vec4 layers[FOURS]; // at each sample, those at `from` taken off
-    float integral;     // mean over the light of the same, for `from` = 0
-    float most;         // the largest change at one edge
+    vec4 layers[FOURS]; // at each sample, those at `from` taken off: see all_layers
+    vec2 integral;      // mean over the light of even and odd layers, for `from` = 0
+    vec2 most;          // the largest change at one edge of either kind
     float lighter;      // the largest part of the light that one edge has fewer layers on
     float fewer;        // by so many
     vec2 beyond;        // a point of that part
 };
+
+// Edges of sheets have an odd number of faces more on one side, those of bodies an even one. The layers of the
+// former are stored a second time in these parts of one, which as float both of up to 2048 layers have room for.
+const float ODD_PARTS = 4096.0;
+
+vec4 all_layers(vec4 stored) {
+    return round(stored);
+}
 
 CoverageReceiver coverage_receiver(Light light, vec3 p, vec3 n, float rounding_m) {
     vec3 offset = light_offset(light, p);
@@ -87,25 +95,33 @@ vec3 to_light_place(CoverageReceiver r, vec2 place) {
     return r.center + place.x * r.axis_u + place.y * r.axis_v;
 }
 
-float in_order_determinant(vec3 a, vec3 b, vec3 c) {
-    precise float x = a.x * (b.y * c.z - b.z * c.y);
-    precise float y = a.y * (b.z * c.x - b.x * c.z);
-    precise float z = a.z * (b.x * c.y - b.y * c.x);
-    precise float sum = x + y + z;
-    return sum;
+// Whether a triangle's plane has the receiver on its front or back: the sign of the volume that it spans with
+// it. Its sides are differences of the stored positions, which stay exact where it is small and far away.
+// A receiver in the plane counts as if moved from it a little, by the same way for all planes: so triangles
+// of one plane agree, and the edges between them, which are silhouettes of nothing, do not count.
+float side_of_plane(vec3 one, vec3 two, vec3 three, vec3 p) {
+    precise vec3 from = one - p;
+    precise vec3 first = two - one;
+    precise vec3 second = three - one;
+    precise float nx = first.y * second.z - first.z * second.y;
+    precise float ny = first.z * second.x - first.x * second.z;
+    precise float nz = first.x * second.y - first.y * second.x;
+    precise float sum = from.x * nx + from.y * ny + from.z * nz;
+    float side = sum != 0.0 ? sum : (nx != 0.0 ? nx : (ny != 0.0 ? ny : nz));
+    return side >= 0.0 ? 1.0 : -1.0;
 }
 
 // 1 where the third point's face lies where the determinant with the first two is positive, else -1: a
-// face seen edge-on counts as one or the other, for all of its edges alike.
+// face seen edge-on counts as one or the other, for all of its edges alike. a and b: scene space.
 float side_of_face(CoverageReceiver r, uint ia, vec3 a, uint ib, vec3 b, uint corner) {
-    vec3 c = fetch_point(corner).xyz - r.p;
+    vec3 c = fetch_point(corner).xyz;
     // Ends of an edge are in the order of their numbers.
     bool first = corner < ia;
     bool last = corner > ib;
     vec3 one = first ? c : a;
     vec3 two = first ? a : (last ? b : c);
     vec3 three = last ? c : b;
-    float sign_of = in_order_determinant(one, two, three) >= 0.0 ? r.turn : -r.turn;
+    float sign_of = side_of_plane(one, two, three, r.p) * r.turn;
     return first || last ? sign_of : -sign_of;
 }
 
@@ -183,8 +199,10 @@ float part_beyond(vec2 foot, vec2 along, float off, vec2 range) {
 
 void add_edge(CoverageReceiver r, uint number, inout Coverage found) {
     uvec4 edge = fetch_edge(number);
-    vec3 a = fetch_point(edge.x).xyz - r.p;
-    vec3 b = fetch_point(edge.y).xyz - r.p;
+    vec3 world_a = fetch_point(edge.x).xyz;
+    vec3 world_b = fetch_point(edge.y).xyz;
+    vec3 a = world_a - r.p;
+    vec3 b = world_b - r.p;
     vec3 on_a = on_light(r, a);
     vec3 on_b = on_light(r, b);
     // What is not above the receiver's plane, not before it or not before the light hides nothing.
@@ -218,15 +236,17 @@ void add_edge(CoverageReceiver r, uint number, inout Coverage found) {
     if (piece.x >= piece.y) {
         return;
     }
-    float faces = faces_on_one_side(r, edge, a, b);
+    float faces = faces_on_one_side(r, edge, world_a, world_b);
     if (faces == 0.0) {
         return;
     }
     bool over = line.z > 0.0;
     float part = part_beyond(foot, along, abs(height), piece);
     float change = over ? -faces : faces;
-    found.integral += change * part;
-    found.most = max(found.most, abs(faces));
+    bool odd = (uint(abs(faces)) & 1u) != 0u;
+    vec2 kind = odd ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
+    found.integral += change * part * kind;
+    found.most = max(found.most, abs(faces) * kind);
     if (change < 0.0 && part > found.lighter) {
         found.lighter = part;
         found.fewer = -change;
@@ -238,7 +258,7 @@ void add_edge(CoverageReceiver r, uint number, inout Coverage found) {
     }
 
     bool from_over = dot(line.xy, r.from) + line.z > 0.0;
-    float count = from_over ? -faces : faces;
+    float count = (from_over ? -faces : faces) * (odd ? 1.0 + 1.0 / ODD_PARTS : 1.0);
     vec2 shifted_a = end_a.xy - r.from * end_a.z;
     vec2 shifted_b = end_b.xy - r.from * end_b.z;
     for (uint i = 0u; i < FOURS; ++i) {

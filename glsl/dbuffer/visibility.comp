@@ -70,7 +70,8 @@ vec4 fetch_point_texel(ivec2 place) {
     return texelFetch(points, place, 0);
 }
 
-// What positions are rounded by, as a part of the largest coordinate: a few units of the last place.
+// What positions are rounded by, as a part of the largest coordinate that they are made from, the camera's
+// among them: a few units of the last place.
 const float POSITION_ROUNDING = 1.0 / 2097152.0;
 
 // Layers along the light in which the estimate below holds on to the edges' own number.
@@ -208,7 +209,8 @@ struct Level {
 Level next_level(Coverage found, bool whole, vec3 horizon, float least) {
     Level level = Level(1.0e9, 0u, vec2(0.0));
     for (uint i = 0u; i < FOURS; ++i) {
-        vec4 layers = whole ? found.layers[i] : mix(vec4(1.0e9), found.layers[i], above_plane(horizon, i));
+        vec4 all = all_layers(found.layers[i]);
+        vec4 layers = whole ? all : mix(vec4(1.0e9), all, above_plane(horizon, i));
         for (uint j = 0u; j < 4u; ++j) {
             float here = layers[j] >= least ? layers[j] : 1.0e9;
             bool fewer = here < level.layers;
@@ -235,7 +237,7 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     if (above <= 0.0 || behind) {
         return id == 0u ? 1.0 : (above <= 0.0 ? 0.0 : texelFetch(hard, ivec2(pixel), 0).x);
     }
-    vec3 extent = max(abs(p), sun ? vec3(0.0) : abs(view.light.center.xyz));
+    vec3 extent = max(max(abs(p), abs(view.camera.eye.xyz)), sun ? vec3(0.0) : abs(view.light.center.xyz));
     float rounding_m = POSITION_ROUNDING * max(extent.x, max(extent.y, extent.z));
     CoverageReceiver r = coverage_receiver(view.light, p, n, rounding_m);
     vec3 horizon = vec3(dot(n, r.axis_u), dot(n, r.axis_v), dot(n, r.center));
@@ -254,8 +256,8 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     for (uint i = 0u; i < FOURS; ++i) {
         found.layers[i] = vec4(0.0);
     }
-    found.integral = 0.0;
-    found.most = 0.0;
+    found.integral = vec2(0.0);
+    found.most = vec2(0.0);
     found.lighter = 0.0;
     found.fewer = 0.0;
     found.beyond = vec2(0.0);
@@ -303,25 +305,28 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     // Visible are the samples without layers. Where all blockers have the same number of layers and none
     // is behind another, the part of the light that they hide is proportional to the mean number, which
     // is known exactly: so the samples' own mean of it, in the proportion that they show, is replaced by
-    // the exact one (a control variate).
+    // the exact one (a control variate). Bodies have an even number of layers and sheets an odd one: each
+    // kind has a proportion of its own.
     float weight = 0.0;
     float hidden = 0.0;
     uvec2 seen = uvec2(0u);
-    float mean = 0.0;
-    float square = 0.0;
-    float both = 0.0;
+    vec2 mean = vec2(0.0); // of even and odd layers
+    vec3 square = vec3(0.0); // of both, and their product
+    vec2 both = vec2(0.0); // of each and what is hidden
     for (uint i = 0u; i < FOURS; ++i) {
-        vec4 layers = found.layers[i] - fewest;
-        vec4 is_hidden = vec4(greaterThan(layers, vec4(0.5)));
+        vec4 all = all_layers(found.layers[i]);
+        vec4 odd = (found.layers[i] - all) * ODD_PARTS;
+        vec4 even = all - odd;
+        vec4 is_hidden = vec4(greaterThan(all - fewest, vec4(0.5)));
         vec4 counts = whole ? vec4(1.0) : above_plane(horizon, i);
         weight += dot(counts, vec4(1.0));
         hidden += dot(is_hidden, counts);
         uint bits = bits_of(counts - is_hidden - 0.5);
         seen.x |= i < 8u ? bits << (4u * i & 31u) : 0u;
         seen.y |= i < 8u ? 0u : bits << (4u * i & 31u);
-        mean += dot(layers, counts);
-        square += dot(layers * layers, counts);
-        both += dot(layers * is_hidden, counts);
+        mean += vec2(dot(even, counts), dot(odd, counts));
+        square += vec3(dot(even * even, counts), dot(odd * odd, counts), dot(even * odd, counts));
+        both += vec2(dot(even, is_hidden), dot(odd, is_hidden));
     }
     float cut_away = 0.0;
     if (MASKED != 0u) {
@@ -338,11 +343,11 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     }
     hidden /= weight;
     mean /= weight;
-    square = square / weight - mean * mean;
-    both = both / weight - mean * hidden;
-    float proportion = found.most > 0.0 ? (both + FEW / found.most) / (max(square, 0.0) + FEW) : 0.0;
-    float exact = found.integral - fewest;
-    return clamp(1.0 - hidden - cut_away / weight - proportion * (exact - mean), 0.0, 1.0);
+    square = square / weight - vec3(mean * mean, mean.x * mean.y) + vec3(FEW, FEW, 0.0);
+    both = both / weight - mean * hidden + FEW / max(found.most, vec2(1.0));
+    float spread = max(square.x * square.y - square.z * square.z, FEW * FEW);
+    vec2 proportion = (square.yx * both - square.z * both.yx) / spread;
+    return clamp(1.0 - hidden - cut_away / weight - dot(proportion, found.integral - mean), 0.0, 1.0);
 }
 
 void main() {

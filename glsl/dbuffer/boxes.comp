@@ -1,5 +1,5 @@
 #version 460
-// Boxes around silhouettes, 16 at a time, or around 16 boxes.
+// Boxes around silhouettes, 16 at a time, whose ends are put down on the way; or around 16 boxes.
 
 #include "dbuffer/lists.glsl"
 #include "silhouettes/edges.glsl"
@@ -14,6 +14,7 @@ layout(set = 0, binding = 2) uniform usampler2D edges;
 layout(set = 0, binding = 3) uniform sampler2D points;
 layout(set = 0, binding = 4) uniform sampler2D below;
 layout(set = 0, binding = 5, rgba32f) uniform writeonly image2D boxes;
+layout(set = 0, binding = 6, rgba32f) uniform writeonly image2D ends;
 
 layout(push_constant) uniform Push {
     uint size; // silhouettes of a box of `below`; 0 where boxes are around silhouettes
@@ -48,6 +49,8 @@ void main() {
             vec3 b = fetch_point(edge.y).xyz;
             low = min(low, min(a, b));
             high = max(high, max(a, b));
+            imageStore(ends, triangle_texel_place(2u * i), vec4(a, 0.0));
+            imageStore(ends, triangle_texel_place(2u * i + 1u), vec4(b, 0.0));
         } else {
             low = min(low, texelFetch(below, triangle_texel_place(2u * i), 0).xyz);
             high = max(high, texelFetch(below, triangle_texel_place(2u * i + 1u), 0).xyz);

@@ -197,6 +197,36 @@ float part_beyond(vec2 foot, vec2 along, float off, vec2 range) {
     return max(0.5 * angle - triangle, 0.0) / PI;
 }
 
+// Whether points on a common side of a bound of the light, of its plane, of the receiver's or of the light's own
+// do not hide any of it: each is a linear function that is negative at all that is between them as well. The
+// largest of each over the points: four bounds of the light's square; behind the light, above both planes.
+struct Reach {
+    vec4 within;
+    vec3 before;
+};
+
+Reach reach_of(CoverageReceiver r, vec3 d) {
+    vec3 on = on_light(r, d);
+    float least = r.rounding_m * length(r.row_w);
+    float behind = LIGHT_SHAPE == LIGHT_SUN ? 1.0 : 1.0 - on.z;
+    return Reach(on.z + vec4(on.x, -on.x, on.y, -on.y), vec3(behind, on.z - least, dot(r.n, d) - r.rounding_m));
+}
+
+bool may_matter(Reach most) {
+    return all(greaterThan(most.within, vec4(0.0))) && all(greaterThan(most.before, vec3(0.0)));
+}
+
+Reach larger(Reach one, Reach other) {
+    return Reach(max(one.within, other.within), max(one.before, other.before));
+}
+
+// Whether an edge may hide any of the light; ends from the receiver. Much less to do than add_edge.
+bool edge_may_matter(CoverageReceiver r, vec3 a, vec3 b) {
+    vec3 line = cross(on_light(r, a), on_light(r, b));
+    float rim = LIGHT_SHAPE == LIGHT_RECT ? abs(line.x) + abs(line.y) : length(line.xy);
+    return may_matter(larger(reach_of(r, a), reach_of(r, b))) && abs(line.z) <= rim;
+}
+
 void add_edge(CoverageReceiver r, uint number, inout Coverage found) {
     uvec4 edge = fetch_edge(number);
     vec3 world_a = fetch_point(edge.x).xyz;

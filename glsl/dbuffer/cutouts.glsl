@@ -26,6 +26,14 @@ uint bits_of(vec4 numbers) {
     return is_set.x | is_set.y << 1 | is_set.z << 2 | is_set.w << 3;
 }
 
+// Whether a triangle has holes and may hide any of the light.
+bool cutout_may_matter(CoverageReceiver r, uint triangle) {
+    Reach ab = larger(reach_of(r, fetch_corner(triangle, 0u).position - r.p),
+        reach_of(r, fetch_corner(triangle, 1u).position - r.p));
+    Reach most = larger(ab, reach_of(r, fetch_corner(triangle, 2u).position - r.p));
+    return may_matter(most) && material_is_masked(fetch_triangle_texel(4u * triangle + 3u).w);
+}
+
 // Takes the samples that the triangle hides out of those still seen: a bit for each, 32 in a word.
 void add_cutout(CoverageReceiver r, uint triangle, inout uvec2 seen) {
     vec3 a = fetch_corner(triangle, 0u).position - r.p;

@@ -6,7 +6,6 @@
 #include "dbuffer/lists.glsl"
 #include "dbuffer/params.glsl"
 #include "shaft_masks/shaft.glsl"
-#include "silhouettes/edges.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -21,25 +20,15 @@ layout(set = 0, binding = 3) uniform sampler2D shafts;
 layout(set = 0, binding = 4, std140) uniform Silhouettes {
     SilhouetteArguments silhouettes;
 };
-layout(set = 0, binding = 5) uniform usampler2D numbers;
-layout(set = 0, binding = 6) uniform usampler2D edges;
-layout(set = 0, binding = 7) uniform sampler2D points;
-layout(set = 0, binding = 8) uniform sampler2D boxes;
-layout(set = 0, binding = 9) uniform sampler2D large_boxes;
-layout(set = 0, binding = 10) uniform sampler2D block_boxes;
-layout(set = 0, binding = 11, std430) buffer Pool {
+layout(set = 0, binding = 5) uniform sampler2D ends;
+layout(set = 0, binding = 6) uniform sampler2D boxes;
+layout(set = 0, binding = 7) uniform sampler2D large_boxes;
+layout(set = 0, binding = 8) uniform sampler2D block_boxes;
+layout(set = 0, binding = 9, std430) buffer Pool {
     uint chunks_used;
 };
-layout(set = 0, binding = 12, r32ui) uniform writeonly uimage2D pool;
-layout(set = 0, binding = 13, rgba32ui) uniform writeonly uimage2D lists;
-
-uvec4 fetch_edge_texel(ivec2 place) {
-    return texelFetch(edges, place, 0);
-}
-
-vec4 fetch_point_texel(ivec2 place) {
-    return texelFetch(points, place, 0);
-}
+layout(set = 0, binding = 10, r32ui) uniform writeonly uimage2D pool;
+layout(set = 0, binding = 11, rgba32ui) uniform writeonly uimage2D lists;
 
 vec4 fetch_triangle_texel(uint texel) {
     return vec4(0.0); // none is needed here
@@ -85,10 +74,8 @@ void main() {
         } else if (at % GROUP == 0u && !meets(shaft, boxes, at / GROUP)) {
             step = GROUP;
         } else {
-            uint number = texelFetch(numbers, triangle_texel_place(at), 0).x;
-            uvec4 edge = fetch_edge(number);
-            vec3 a = fetch_point(edge.x).xyz;
-            vec3 b = fetch_point(edge.y).xyz;
+            vec3 a = texelFetch(ends, triangle_texel_place(2u * at), 0).xyz;
+            vec3 b = texelFetch(ends, triangle_texel_place(2u * at + 1u), 0).xyz;
             if (shaft_meets_triangle(shaft, a, b, b)) {
                 if (slot == CHUNK) {
                     uint fresh = atomicAdd(chunks_used, 1u);
@@ -104,7 +91,7 @@ void main() {
                     slot = 0u;
                 }
                 if (step == 1u) {
-                    imageStore(pool, chunk_entry_place(chunk, slot), uvec4(number));
+                    imageStore(pool, chunk_entry_place(chunk, slot), uvec4(at));
                     slot += 1u;
                     count += 1u;
                 }

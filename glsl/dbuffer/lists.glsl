@@ -2,9 +2,10 @@
 //
 // The list of silhouettes is ordered as the mesh is, so that neighbours in it are mostly neighbours in
 // space: 16 of them have a box, 16 such groups another, and so have 16 of these, a block. No tree is
-// built.
+// built. The ends of silhouette i are texels 2 i and 2 i + 1 of an image of their own, scene space: most that
+// a receiver looks at do not matter to it, and tell so by them.
 //
-// A tile has a list for each block, and one of triangles with holes where the scene has any: chunks of a
+// A tile has a list for each block, of places in the list of silhouettes, and one of triangles with holes where the scene has any: chunks of a
 // pool, linked, so that a list may have any length. Where the pool is used up, a list says from which
 // silhouette or node of the hierarchy on it does not know.
 #ifndef ANTUMBRA_DBUFFER_LISTS_GLSL

@@ -37,6 +37,7 @@ layout(set = 0, binding = 17) uniform usampler2D list;
 layout(set = 0, binding = 18, std140) uniform ThroughBlock {
     Through through;
 };
+layout(set = 0, binding = 19) uniform sampler2D ends;
 
 #include "dbuffer/coverage.glsl"
 #include "dbuffer/cutouts.glsl"
@@ -75,7 +76,7 @@ vec4 fetch_point_texel(ivec2 place) {
 const float POSITION_ROUNDING = 1.0 / 2097152.0;
 
 // Layers along the light in which the estimate below holds on to the edges' own number.
-const float FEW = 1.0e-5;
+const float FEW = 0.02;
 
 // Rays that a receiver may send to tell how many layers there are, and samples that may be off by rounding.
 const uint MOST_RAYS = 4u;
@@ -91,29 +92,56 @@ vec4 above_plane(vec3 horizon, uint i) {
     return vec4(greaterThan(height, vec4(0.0)));
 }
 
-// All of a tile's edges.
+// Places of a list, one after the other: those in chunks first, then all that the list does not know.
+struct Entries {
+    uint chunk;
+    uint slot;
+    uint rest;
+    uint missing;
+    uint end;
+};
+
+Entries list_entries(uint block, uint tile, uint tiles) {
+    uvec4 stored = texelFetch(lists, list_place(block, tile, tiles), 0);
+    return Entries(stored.x, 0u, stored.y, stored.z, stored.w);
+}
+
+bool has_entries(Entries entries) {
+    return entries.rest > 0u || entries.missing < entries.end;
+}
+
+// False where the list only went on to its next chunk.
+bool next_entry(inout Entries entries, out uint entry) {
+    bool listed = entries.rest > 0u;
+    uint stored = texelFetch(pool, chunk_entry_place(entries.chunk, entries.slot), 0).x;
+    bool is_link = listed && entries.slot == CHUNK;
+    entry = listed ? stored : entries.missing;
+    entries.chunk = is_link ? stored : entries.chunk;
+    entries.slot = is_link ? 0u : entries.slot + 1u;
+    entries.rest -= listed && !is_link ? 1u : 0u;
+    entries.missing += listed ? 0u : 1u;
+    return !is_link;
+}
+
+// All of a tile's edges. Vector units walk through branches that none of their lanes takes: so each lane looks
+// for the next edge that matters to it in a loop of its own, and only then do all go through the rest. (A loop that
+// tests its condition at its end loses the values of lanes that leave it early on Mesa 22.3.)
 void add_edges(uint tile, uint tiles, CoverageReceiver r, inout Coverage found) {
     for (uint block = 0u; block < params.sizes.x; ++block) {
-        uvec4 stored = texelFetch(lists, list_place(block, tile, tiles), 0);
-        uint chunk = stored.x;
-        uint slot = 0u;
-        uint rest = stored.y;
-        uint missing = stored.z;
-        while (rest > 0u || missing < stored.w) {
-            uint number;
-            if (rest > 0u) {
-                if (slot == CHUNK) {
-                    chunk = texelFetch(pool, chunk_entry_place(chunk, CHUNK), 0).x;
-                    slot = 0u;
+        Entries entries = list_entries(block, tile, tiles);
+        while (has_entries(entries)) {
+            bool matters = false;
+            uint entry = 0u;
+            while (!matters && has_entries(entries)) {
+                if (next_entry(entries, entry)) {
+                    vec3 a = texelFetch(ends, triangle_texel_place(2u * entry), 0).xyz;
+                    vec3 b = texelFetch(ends, triangle_texel_place(2u * entry + 1u), 0).xyz;
+                    matters = edge_may_matter(r, a - r.p, b - r.p);
                 }
-                number = texelFetch(pool, chunk_entry_place(chunk, slot), 0).x;
-                slot += 1u;
-                rest -= 1u;
-            } else {
-                number = texelFetch(numbers, triangle_texel_place(missing), 0).x;
-                missing += 1u;
             }
-            add_edge(r, number, found);
+            if (matters) {
+                add_edge(r, texelFetch(numbers, triangle_texel_place(entry), 0).x, found);
+            }
         }
     }
 }
@@ -134,31 +162,22 @@ uint cutouts_of(uint tile, uint tiles) {
     return stored.y + stored.w - stored.z;
 }
 
-// All of a tile's triangles with holes.
+// All of a tile's triangles with holes, in two loops like edges.
 void add_cutouts(uint tile, uint tiles, CoverageReceiver r, inout uvec2 seen) {
-    uvec4 stored = texelFetch(lists, list_place(params.sizes.x, tile, tiles), 0);
-    uint chunk = stored.x;
-    uint slot = 0u;
-    uint rest = stored.y;
-    uint node = stored.z;
-    while ((rest > 0u || node < stored.w) && (seen.x | seen.y) != 0u) {
+    Entries entries = list_entries(params.sizes.x, tile, tiles);
+    while (has_entries(entries) && (seen.x | seen.y) != 0u) {
+        bool matters = false;
         uint triangle = 0u;
-        bool found = rest > 0u;
-        if (found) {
-            if (slot == CHUNK) {
-                chunk = texelFetch(pool, chunk_entry_place(chunk, CHUNK), 0).x;
-                slot = 0u;
+        while (!matters && has_entries(entries)) {
+            bool listed = entries.rest > 0u;
+            if (next_entry(entries, triangle)) {
+                // What the list does not know are nodes.
+                float leaf = listed ? float(triangle) : fetch_node_low(triangle).w;
+                triangle = uint(max(leaf, 0.0));
+                matters = leaf >= 0.0 && cutout_may_matter(r, triangle);
             }
-            triangle = texelFetch(pool, chunk_entry_place(chunk, slot), 0).x;
-            slot += 1u;
-            rest -= 1u;
-        } else {
-            float leaf = fetch_node_low(node).w;
-            triangle = uint(max(leaf, 0.0));
-            found = leaf >= 0.0 && material_is_masked(fetch_triangle_texel(4u * triangle + 3u).w);
-            node += 1u;
         }
-        if (found) {
+        if (matters) {
             add_cutout(r, triangle, seen);
         }
     }

@@ -72,10 +72,12 @@ struct Made {
 /// What they make.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
-    /// R32_UINT: chunks of numbers of edges.
+    /// R32_UINT: chunks of places in the list of silhouettes, and of numbers of triangles.
     pub pool: ImageId,
     /// RGBA32_UINT: `list_place` in `dbuffer/lists.glsl`.
     pub lists: ImageId,
+    /// RGBA32F: both ends of each silhouette, scene space, metres.
+    pub ends: ImageId,
     /// Tiles with edges.
     pub tiles: TileList,
     /// `Through` in `dbuffer/through.glsl`.
@@ -92,19 +94,22 @@ impl Lists {
     /// Declares the passes; returns the visibility image too, in which all but the found tiles are
     /// done.
     pub(super) fn add(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> (Found, ImageId) {
+        let ends = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * self.sizes.edges);
+        let mut ends = graph.create_image(format!("{NAME}.ends {}", inputs.light_name), ends);
         let mut boxes: Vec<ImageId> = Vec::new();
         for (level, group) in GROUPS.into_iter().enumerate() {
             let below = level
                 .checked_sub(1)
                 .map(|below| (boxes[below], GROUPS[below]));
-            boxes.push(self.add_boxes(graph, inputs, group, below));
+            let made = self.add_boxes(graph, inputs, group, below, &mut ends);
+            boxes.push(made);
         }
-        let mut made = self.add_lists(graph, inputs, [boxes[0], boxes[1], boxes[2]]);
+        let mut made = self.add_lists(graph, inputs, ends, [boxes[0], boxes[1], boxes[2]]);
         if inputs.scene.has_masks() {
             made = self.add_cutouts(graph, inputs, made);
         }
         let Made { pool, lists, .. } = made;
-        self.add_settle(graph, inputs, pool, lists)
+        self.add_settle(graph, inputs, [pool, lists, ends])
     }
 
     fn add_boxes(
@@ -113,6 +118,7 @@ impl Lists {
         inputs: &ShadowInputs<'_>,
         group: u32,
         below: Option<(ImageId, u32)>,
+        ends: &mut ImageId,
     ) -> ImageId {
         let name = &inputs.light_name;
         let count = self.sizes.edges.div_ceil(group);
@@ -130,6 +136,13 @@ impl Lists {
             pass.read(lower, Access::Sampled(Stage::Compute));
         }
         let boxes = pass.overwrite(boxes, Access::StorageWrite(Stage::Compute));
+        // Boxes of boxes write no ends; something must be bound.
+        let bound_ends = if below.is_none() {
+            *ends = pass.overwrite(*ends, Access::StorageWrite(Stage::Compute));
+            *ends
+        } else {
+            boxes
+        };
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -139,6 +152,7 @@ impl Lists {
                 Bind::sampled(3, points, nearest),
                 Bind::sampled(4, lower, nearest),
                 Bind::storage_image(5, boxes),
+                Bind::storage_image(6, bound_ends),
             ];
             let shader = &spirv::DBUFFER_BOXES_COMP;
             ctx.bind_compute(
@@ -156,6 +170,7 @@ impl Lists {
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
+        ends: ImageId,
         boxes: [ImageId; 3],
     ) -> Made {
         let name = &inputs.light_name;
@@ -174,12 +189,11 @@ impl Lists {
         );
         let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
         let (params, shafts, tiles) = (self.params, self.shafts, self.receivers.list);
-        let Silhouettes { list, arguments } = self.silhouettes;
-        let (edges, points) = (inputs.ids.edges, inputs.ids.points);
+        let arguments = self.silhouettes.arguments;
         let mut pass = graph.pass(format!("{NAME}.lists {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
         pass.read(arguments, Access::Uniform(Stage::Compute));
-        for image in [shafts, list, edges, points].into_iter().chain(boxes) {
+        for image in [shafts, ends].into_iter().chain(boxes) {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         tiles.read(&mut pass);
@@ -194,15 +208,13 @@ impl Lists {
                 Bind::sampled(2, tiles.tiles, nearest),
                 Bind::sampled(3, shafts, nearest),
                 Bind::uniform(4, arguments),
-                Bind::sampled(5, list, nearest),
-                Bind::sampled(6, edges, nearest),
-                Bind::sampled(7, points, nearest),
-                Bind::sampled(8, boxes[0], nearest),
-                Bind::sampled(9, boxes[1], nearest),
-                Bind::sampled(10, boxes[2], nearest),
-                Bind::storage_buffer(11, used),
-                Bind::storage_image(12, pool),
-                Bind::storage_image(13, lists),
+                Bind::sampled(5, ends, nearest),
+                Bind::sampled(6, boxes[0], nearest),
+                Bind::sampled(7, boxes[1], nearest),
+                Bind::sampled(8, boxes[2], nearest),
+                Bind::storage_buffer(9, used),
+                Bind::storage_image(10, pool),
+                Bind::storage_image(11, lists),
             ];
             let shader = &spirv::DBUFFER_LISTS_COMP;
             ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
@@ -252,8 +264,7 @@ impl Lists {
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        pool: ImageId,
-        lists: ImageId,
+        [pool, lists, ends]: [ImageId; 3],
     ) -> (Found, ImageId) {
         let name = &inputs.light_name;
         let size = inputs.camera.size();
@@ -300,6 +311,7 @@ impl Lists {
         let found = Found {
             pool,
             lists,
+            ends,
             tiles,
             through,
         };

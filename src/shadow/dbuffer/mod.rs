@@ -15,7 +15,7 @@
 //! | `params` | places on the light |
 //! | `map`, `visibility` of `dbuffer.hard` | what sees the light's centre |
 //! | `silhouettes.*` | the list of edges ([`super::silhouettes`]), kept while light and casters stand still |
-//! | `boxes` | boxes around 16, 256 and 4096 of them |
+//! | `boxes` | the ends of edges, boxes around 16, 256 and 4096 of them |
 //! | `start`, `tiles`, `shafts` | tiles that some of the light is above, what is between both |
 //! | `lists` | the edges of each tile |
 //! | `cutouts` | its triangles with holes, if the scene has any: these hide samples of the light |
@@ -175,6 +175,7 @@ fn add_visibility<'f>(
     let lists::Found {
         pool,
         lists,
+        ends,
         tiles,
         through,
     } = *found;
@@ -190,6 +191,7 @@ fn add_visibility<'f>(
         ids.edges,
         ids.points,
         numbers,
+        ends,
         pool,
         lists,
         hard,
@@ -224,6 +226,7 @@ fn add_visibility<'f>(
             Bind::uniform(16, tiles.arguments),
             Bind::sampled(17, tiles.tiles, nearest),
             Bind::uniform(18, through),
+            Bind::sampled(19, ends, nearest),
         ];
         let pipeline = ComputePipelineDesc {
             constants: vec![(0, shape), (1, fours), (2, masked)],

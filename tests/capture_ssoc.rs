@@ -77,6 +77,54 @@ fn errors(image: &[f32], step: u32, truth: impl Fn(Vec3) -> f32) -> (f32, f32) {
     ((squares / count as f32).sqrt(), worst)
 }
 
+/// Largest change of the error from one pixel of a row to the next: what shows as stairs.
+fn largest_stair(image: &[f32], truth: impl Fn(Vec3) -> f32) -> f32 {
+    let rows = (0..SIZE).flat_map(|y| (1..SIZE).map(move |x| (x, y)));
+    let error = |x: u32, y: u32| {
+        image[(y * SIZE + x) as usize] - truth(Vec3::new(floor_x(x), 0.0, floor_x(y)))
+    };
+    let stairs = rows.map(|(x, y)| (error(x, y) - error(x - 1, y)).abs());
+    stairs.fold(0.0, f32::max)
+}
+
+/// A long inclined edge, in one piece and in many, shows no stairs however coarse the maps: texels say
+/// which edge counts, and not how far away it is.
+#[test]
+fn an_inclined_edge_shows_no_stairs() {
+    let _one = support::serial();
+    let depth = 5.0;
+    let (sine, cosine) = 0.3_f32.sin_cos();
+    let across = Vec3::new(cosine, 0.0, sine);
+    let along = Vec3::new(-sine, 0.0, cosine);
+    let truth = |p: Vec3| {
+        // The edge's line in the unit disk of the light.
+        let part = depth / HEIGHT;
+        let line = (-across.dot(p) * part / (1.0 - part)).clamp(-1.0, 1.0);
+        (line.acos() - line * (1.0 - line * line).sqrt()) / std::f32::consts::PI
+    };
+    for pieces in [1, 200] {
+        let at = |i: i32, far: f32| {
+            let along = along * (20.0 * (2.0 * i as f32 / pieces as f32 - 1.0));
+            Vec3::new(0.0, HEIGHT - depth, 0.0) + along - across * far
+        };
+        let plates = (0..pieces).map(|i| {
+            let corners = [at(i, 0.0), at(i + 1, 0.0), at(i + 1, 30.0), at(i, 30.0)];
+            quad("piece", corners)
+        });
+        let all = std::iter::once(floor()).chain(plates).collect();
+        let techniques = [
+            "ssoc",
+            "ssoc:bands=64",
+            "ssoc:lookups=1,bands=64",
+            "ssoc:combine=product,lookups=1,bands=64",
+        ];
+        let images = render(&scene(all, DISK), &techniques);
+        let stairs: Vec<_> = images.iter().map(|i| largest_stair(i, truth)).collect();
+        println!("{pieces} pieces: stairs {stairs:?}");
+        assert!(stairs.iter().all(|s| *s <= 0.002), "{pieces}: {stairs:?}");
+    }
+}
+
 /// What 20,000 samples of a disk are off by at an edge.
 const SAMPLED: f32 = 0.002;
 
@@ -239,7 +287,8 @@ fn a_large_sphere_light_behind_a_ball() {
     let (middle, radius, light) = (Vec3::new(-2.0, 5.0, 0.0), 2.0, 1.35);
     let shape = LightShape::Sphere { radius: light };
     let scene = scene(vec![floor(), ball(middle, radius, 64)], shape);
-    let image = &render(&scene, &["ssoc"])[0];
+    let images = render(&scene, &["ssoc", "ssoc:lookups=1", "ssoc:lookups=1,bands=128", "ssoc:bands=128", "ssoc:lookups=32"]);
+    let image = &images[0];
     let center = Vec3::new(0.0, HEIGHT, 0.0);
     // Rays from a point to the disk that it sees of the light.
     let free = |p: Vec3, passes: &dyn Fn(Vec3) -> bool| {
@@ -273,6 +322,8 @@ fn a_large_sphere_light_behind_a_ball() {
     let (rms, worst) = errors(image, 4, seen);
     let (of_outline, _) = errors(image, 4, seen_past_outline);
     println!("ball: rms {rms}, largest {worst}; of its outline: rms {of_outline}");
+    let stairs: Vec<_> = images.iter().map(|i| largest_stair(i, |_| 0.0)).collect();
+    println!("ball: steps {stairs:?}");
     // What is between the ball and its outline is the method's own error: rms 0.0165 here.
     assert!(of_outline <= 0.01, "{of_outline}");
     assert!(rms <= 0.01 + 0.0165, "{rms}");

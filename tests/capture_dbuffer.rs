@@ -3,7 +3,7 @@
 
 mod support;
 
-use antumbra::capture::{FrameRenderer, FrameRequest};
+use antumbra::capture::FrameRequest;
 use antumbra::light::{AreaLight, LightShape};
 use antumbra::scene::{AlphaMode, Material, Primitive, Scene, SceneCamera};
 use glam::Vec3;
@@ -15,20 +15,19 @@ const DISK: LightShape = LightShape::Disk { radius: 1.0 };
 type Plate = (f32, [f32; 2], [f32; 2]);
 
 fn render(scene: &Scene, techniques: &[&str]) -> Vec<Vec<f32>> {
-    let mut renderer = FrameRenderer::new(support::gpu(), scene).unwrap();
-    let images = techniques.iter().map(|technique| {
-        let request = FrameRequest {
-            camera: camera(),
-            size: [SIZE; 2],
-            lights: vec![0],
-            technique: technique.parse().unwrap(),
-        };
-        let mut frame = renderer.render(&request).unwrap();
-        frame.lights.remove(0).visibility
-    });
-    let images = images.collect();
-    support::assert_no_messages(&renderer.destroy().unwrap());
-    images
+    support::rig::with_renderer(scene, |renderer| {
+        let images = techniques.iter().map(|technique| {
+            let request = FrameRequest {
+                camera: camera(),
+                size: [SIZE; 2],
+                lights: vec![0],
+                technique: technique.parse().unwrap(),
+            };
+            let mut frame = renderer.render(&request).unwrap();
+            frame.lights.remove(0).visibility
+        });
+        images.collect()
+    })
 }
 
 /// Places on a unit disk, or -1 to 1 along both axes of a square, evenly.

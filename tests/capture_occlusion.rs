@@ -4,12 +4,13 @@
 
 mod support;
 
-use antumbra::capture::{CapturedFrame, FrameRenderer, FrameRequest, Samples};
+use antumbra::capture::{CapturedFrame, FrameRequest, Samples};
 use antumbra::light::LightShape;
 use antumbra::reference::{Reference, Sampling, Settings};
 use antumbra::scene::{Aabb, Scene, SceneCamera};
 use glam::Vec3;
 use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, quad, scene};
+use support::rig::with_renderer;
 
 fn square(half: f32) -> LightShape {
     LightShape::Rect {
@@ -31,14 +32,13 @@ fn request(camera: &SceneCamera, size: [u32; 2], options: &str) -> FrameRequest 
 }
 
 fn render(scene: &Scene, options: &[&str]) -> Vec<Vec<f32>> {
-    let mut renderer = FrameRenderer::new(support::gpu(), scene).unwrap();
-    let images = options.iter().map(|options| {
-        let frame = renderer.render(&request(&camera(), [SIZE; 2], options));
-        frame.unwrap().lights.remove(0).visibility
-    });
-    let images: Vec<Vec<f32>> = images.collect();
-    support::assert_no_messages(&renderer.destroy().unwrap());
-    images
+    with_renderer(scene, |renderer| {
+        let images = options.iter().map(|options| {
+            let frame = renderer.render(&request(&camera(), [SIZE; 2], options));
+            frame.unwrap().lights.remove(0).visibility
+        });
+        images.collect()
+    })
 }
 
 /// Largest error against the half-plane x <= 0 at a depth: linear across the light of half width 1.
@@ -144,7 +144,6 @@ fn tables_are_the_sums_of_their_texels() {
         ));
     }
     let scene = scene(primitives, square(1.0));
-    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
     // With few fine slices the groups are the slices, in order.
     let request = request(
         &camera(),
@@ -155,8 +154,9 @@ fn tables_are_the_sums_of_their_texels() {
         "occlusion-textures.bits 0:lamp.0[0]",
         "occlusion-textures.tables 0:lamp.0[0]",
     ];
-    let frame = renderer.render_with_images(&request, &names).unwrap();
-    support::assert_no_messages(&renderer.destroy().unwrap());
+    let frame = with_renderer(&scene, |renderer| {
+        renderer.render_with_images(&request, &names).unwrap()
+    });
     let bits = plane(&frame, names[0], 0);
     let occupied: Vec<u32> = (0..8)
         .filter(|slice| bits.iter().any(|b| b >> slice & 1 == 1))
@@ -239,21 +239,22 @@ fn without_casters_there_are_no_slices() {
     let ground = scene(vec![floor()], square(1.0));
     let with_sheet = scene(vec![floor(), quad("sheet", sheet)], square(1.0));
     for (scene, slices) in [(&ground, false), (&with_sheet, true)] {
-        let mut renderer = FrameRenderer::new(support::gpu(), scene).unwrap();
         let mut request = request(&camera(), [SIZE; 2], "");
-        let frame = renderer.render(&request).unwrap();
+        let draw = |request: &FrameRequest| {
+            with_renderer(scene, |renderer| renderer.render(request).unwrap())
+        };
+        let frame = draw(&request);
         let passes = frame.passes.iter().map(|(name, _)| name.as_str());
         let sliced = passes.filter(|name| name.contains("slices")).count();
         assert_eq!(sliced > 0, slices);
         request.technique = "shaft-masks".parse().unwrap();
-        let exact = renderer.render(&request).unwrap();
+        let exact = draw(&request);
         let pairs = frame.lights[0]
             .visibility
             .iter()
             .zip(&exact.lights[0].visibility);
         let most = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(slices || most == 0.0, "{most}");
-        support::assert_no_messages(&renderer.destroy().unwrap());
     }
 }
 
@@ -292,13 +293,9 @@ fn a_receiver_that_passes_slice_planes_sees_no_step() {
         znear: 0.01,
         ..SceneCamera::framing(&Aabb::EMPTY)
     };
-    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
-    let options = "resolution=1024";
     // One row of 1000 pixels, less than 3 mm apart.
-    let frame = renderer
-        .render(&request(&above, [1000, 2], options))
-        .unwrap();
-    support::assert_no_messages(&renderer.destroy().unwrap());
+    let request = request(&above, [1000, 2], "resolution=1024");
+    let frame = with_renderer(&scene, |renderer| renderer.render(&request).unwrap());
     let row = &frame.lights[0].visibility[..1000];
     let step = row
         .windows(2)
@@ -429,7 +426,6 @@ fn every_option_renders_the_same_twice_without_a_message() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/foliage.glb");
     let scene = Scene::load(&path, &Default::default()).unwrap();
     let camera = scene.select_camera(None).unwrap();
-    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
     for options in [
         "",
         "slices=4,planes=uniform,fit=range",
@@ -438,8 +434,9 @@ fn every_option_renders_the_same_twice_without_a_message() {
         "filter=mipmaps,detail=1,resolution=128",
     ] {
         let request = request(&camera, [96, 96], options);
-        let first = renderer.render(&request).unwrap();
-        let second = renderer.render(&request).unwrap();
+        let [first, second] = with_renderer(&scene, |renderer| {
+            [(); 2].map(|()| renderer.render(&request).unwrap())
+        });
         let values = &first.lights[0].visibility;
         assert!(*values == second.lights[0].visibility, "{options}");
         assert!(values.iter().all(|v| (0.0..=1.0).contains(v)), "{options}");
@@ -448,5 +445,4 @@ fn every_option_renders_the_same_twice_without_a_message() {
             "{options}"
         );
     }
-    support::assert_no_messages(&renderer.destroy().unwrap());
 }

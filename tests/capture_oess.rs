@@ -3,7 +3,7 @@
 
 mod support;
 
-use antumbra::capture::{FrameRenderer, FrameRequest};
+use antumbra::capture::FrameRequest;
 use antumbra::light::LightShape;
 use antumbra::scene::{Primitive, Scene};
 use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, scene};
@@ -19,24 +19,19 @@ fn line(length: f32) -> LightShape {
 }
 
 fn render(scene: &Scene, techniques: &[&str]) -> Vec<Vec<f32>> {
-    let mut renderer = FrameRenderer::new(support::gpu(), scene).unwrap();
-    let images = techniques.iter().map(|technique| {
-        let request = FrameRequest {
-            camera: camera(),
-            size: [SIZE; 2],
-            lights: vec![0],
-            technique: technique.parse().unwrap(),
-        };
-        renderer
-            .render(&request)
-            .unwrap()
-            .lights
-            .remove(0)
-            .visibility
-    });
-    let images = images.collect();
-    support::assert_no_messages(&renderer.destroy().unwrap());
-    images
+    support::rig::with_renderer(scene, |renderer| {
+        let images = techniques.iter().map(|technique| {
+            let request = FrameRequest {
+                camera: camera(),
+                size: [SIZE; 2],
+                lights: vec![0],
+                technique: technique.parse().unwrap(),
+            };
+            let mut frame = renderer.render(&request).unwrap();
+            frame.lights.remove(0).visibility
+        });
+        images.collect()
+    })
 }
 
 /// Part of the line that level plates, given by depth and x range, leave free of a point of the floor.

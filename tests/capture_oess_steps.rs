@@ -3,7 +3,7 @@
 
 mod support;
 
-use antumbra::capture::{FrameRenderer, FrameRequest, Samples};
+use antumbra::capture::{FrameRequest, Samples};
 use antumbra::light::{LightProfile, LightShape};
 use antumbra::scene::{Scene, SceneCamera};
 use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, scene};
@@ -20,15 +20,15 @@ struct Frame {
 }
 
 fn frame(scene: &Scene, camera: &SceneCamera, technique: &str, names: &[&str]) -> Frame {
-    let mut renderer = FrameRenderer::new(support::gpu(), scene).unwrap();
     let request = FrameRequest {
         camera: camera.clone(),
         size: [SIZE; 2],
         lights: vec![0],
         technique: technique.parse().unwrap(),
     };
-    let mut frame = renderer.render_with_images(&request, names).unwrap();
-    support::assert_no_messages(&renderer.destroy().unwrap());
+    let mut frame = support::rig::with_renderer(scene, |renderer| {
+        renderer.render_with_images(&request, names).unwrap()
+    });
     let images = frame.images.into_iter().map(|image| {
         let Some(Samples::Uint(values)) = image.planes.into_iter().next() else {
             panic!("{} holds no numbers", image.name);
@@ -281,15 +281,14 @@ fn segments_are_looked_at_where_something_hides_between_the_ends() {
     // Nothing that a map shows hides between points so near to each other: no maps of further points.
     let passes = |length: f32| {
         let scene = lines(&SLATS, length);
-        let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
         let request = FrameRequest {
             camera: camera(),
             size: [SIZE; 2],
             lights: vec![0],
             technique: "oess".parse().unwrap(),
         };
-        let frame = renderer.render(&request).unwrap();
-        support::assert_no_messages(&renderer.destroy().unwrap());
+        let frame =
+            support::rig::with_renderer(&scene, |renderer| renderer.render(&request).unwrap());
         let maps = frame.passes.iter().map(|(name, _)| name);
         maps.filter(|name| name.starts_with("oess.map ")).count()
     };

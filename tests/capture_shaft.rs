@@ -3,7 +3,10 @@
 
 mod support;
 
-use antumbra::capture::{CapturedImage, FrameRenderer, FrameRequest, Samples};
+#[path = "capture_shaft/refine.rs"]
+mod refine;
+
+use antumbra::capture::{CapturedImage, FrameRequest, Samples};
 use antumbra::light::{AreaLight, LightShape};
 use antumbra::reference::{Pattern, Reference, Sampling, Settings, Surface};
 use antumbra::scene::{LoadOptions, Scene, SceneCamera};
@@ -11,6 +14,7 @@ use antumbra::shadow::shaft_masks::light_samples;
 use glam::{DVec3, UVec2};
 use std::path::Path;
 use support::plates::{self, HEIGHT, floor, floor_x, plate};
+use support::rig::with_renderer;
 
 const SIZE: [u32; 2] = [64; 2];
 
@@ -21,29 +25,28 @@ fn load(name: &str) -> Scene {
     Scene::load(&path, &LoadOptions::default()).unwrap()
 }
 
-/// Visibility of every light, and the surfaces, for each technique. One renderer serves all scenes, so
-/// that pipelines are made once.
+/// Visibility of every light, and the surfaces, for each technique.
 fn render(
-    renderer: &mut FrameRenderer<'static>,
     scene: &Scene,
     camera: &SceneCamera,
     techniques: &[&str],
 ) -> Vec<(Vec<Vec<f32>>, Surfaces)> {
-    renderer.set_scene(scene.clone()).unwrap();
-    let images = techniques.iter().map(|technique| {
-        let request = FrameRequest {
-            camera: camera.clone(),
-            size: SIZE,
-            lights: (0..scene.lights.len()).collect(),
-            technique: technique.parse().unwrap(),
-        };
-        let frame = renderer
-            .render_with_images(&request, &["normal", "depth"])
-            .unwrap();
-        let lights = frame.lights.into_iter().map(|light| light.visibility);
-        (lights.collect(), Surfaces::of(&frame.images))
-    });
-    images.collect()
+    with_renderer(scene, |renderer| {
+        let images = techniques.iter().map(|technique| {
+            let request = FrameRequest {
+                camera: camera.clone(),
+                size: SIZE,
+                lights: (0..scene.lights.len()).collect(),
+                technique: technique.parse().unwrap(),
+            };
+            let frame = renderer
+                .render_with_images(&request, &["normal", "depth"])
+                .unwrap();
+            let lights = frame.lights.into_iter().map(|light| light.visibility);
+            (lights.collect(), Surfaces::of(&frame.images))
+        });
+        images.collect()
+    })
 }
 
 /// What was drawn at each pixel.
@@ -98,12 +101,12 @@ fn cast(
 /// Compares with rays. Rasterisation may find another triangle than the ray through a pixel's centre
 /// where that passes within a sub-texel step of an edge, and then shades a point beyond that
 /// triangle: such pixels are told by their normals and depths, and are few.
-fn check(renderer: &mut FrameRenderer<'static>, name: &str, side: u32) {
+fn check(name: &str, side: u32) {
     let scene = load(name);
     let camera = scene.select_camera(None).unwrap();
     let samples = side * side;
     let technique = format!("shaft-masks:samples={samples},target-error=none");
-    let images = render(renderer, &scene, &camera, &[&technique]);
+    let images = render(&scene, &camera, &[&technique]);
     let reference = Reference::new(&scene).unwrap();
     let (images, surfaces) = &images[0];
     for (image, light) in images.iter().zip(&scene.lights) {
@@ -138,7 +141,9 @@ fn check(renderer: &mut FrameRenderer<'static>, name: &str, side: u32) {
         assert!(part <= MOST, "{name}, `{}`: {part}", light.name);
         // The fewer sub-texel steps, the more centres lie within one of an edge: 0.1 % of pixels at
         // 256 steps, 0.4 % at SwiftShader's 16, among them all wires of the fences.
-        let bits = renderer.gpu().info().limits.sub_pixel_precision_bits;
+        let bits = with_renderer(&scene, |renderer| {
+            renderer.gpu().info().limits.sub_pixel_precision_bits
+        });
         let most = f64::from(pixels) * (8.0e-4 + 0.0512 / f64::from(1_u32 << bits.min(16)));
         assert!(f64::from(others) <= most.max(2.0), "{name}: {others}");
     }
@@ -160,23 +165,20 @@ const SCENES: [&str; 6] = [
 #[test]
 fn masks_are_those_of_rays() {
     let _one = support::serial();
-    let mut renderer = FrameRenderer::owning(support::gpu(), load(SCENES[0])).unwrap();
     for name in SCENES {
-        check(&mut renderer, name, 8);
+        check(name, 8);
     }
-    check(&mut renderer, "mirrored.gltf", 16);
-    check(&mut renderer, "sphere_over_plane.gltf", 32);
-    support::assert_no_messages(&renderer.destroy().unwrap());
+    check("mirrored.gltf", 16);
+    check("sphere_over_plane.gltf", 32);
 }
 
 #[test]
 fn lists_without_room_change_nothing() {
     let _one = support::serial();
-    let mut renderer = FrameRenderer::owning(support::gpu(), load(SCENES[0])).unwrap();
-    let mut same = |name: &str, techniques: &[&str]| {
+    let same = |name: &str, techniques: &[&str]| {
         let scene = load(name);
         let camera = scene.select_camera(None).unwrap();
-        let images = render(&mut renderer, &scene, &camera, techniques);
+        let images = render(&scene, &camera, techniques);
         for (image, technique) in images.iter().zip(techniques) {
             let off = image.0.iter().flatten().zip(images[0].0.iter().flatten());
             let off = off.filter(|(v, wanted)| v != wanted).count();
@@ -193,12 +195,11 @@ fn lists_without_room_change_nothing() {
     same("figure.glb", &techniques);
     // Tens of thousands of triangles in a shaft, cut out by their texture.
     same("foliage.glb", &techniques[..2]);
-    support::assert_no_messages(&renderer.destroy().unwrap());
 }
 
 /// Visibility of one light and the bound on its error.
 fn bounded(
-    renderer: &mut FrameRenderer<'static>,
+    scene: &Scene,
     camera: &SceneCamera,
     light: usize,
     technique: &str,
@@ -209,9 +210,10 @@ fn bounded(
         lights: vec![light],
         technique: technique.parse().unwrap(),
     };
-    let frame = renderer
-        .render_with_images(&request, &["visibility_bound"])
-        .unwrap();
+    let frame = with_renderer(scene, |renderer| {
+        let images = ["visibility_bound"];
+        renderer.render_with_images(&request, &images).unwrap()
+    });
     let Samples::Float(bound) = &frame.images[0].planes[0] else {
         panic!("{:?}", frame.images[0].planes);
     };
@@ -225,18 +227,17 @@ fn errors_are_within_their_bounds() {
     let _one = support::serial();
     let scene = load("lights.gltf");
     let camera = scene.select_camera(None).unwrap();
-    let mut renderer = FrameRenderer::owning(support::gpu(), scene.clone()).unwrap();
     // A disk, a line and a sun: a rectangle's cells are simpler, and a sphere's those of a disk.
     for light in [0, 3, 4] {
         let name = &scene.lights[light].name;
         let (few, bound) = bounded(
-            &mut renderer,
+            &scene,
             &camera,
             light,
             "shaft-masks:samples=64,target-error=none",
         );
         let (many, finer) = bounded(
-            &mut renderer,
+            &scene,
             &camera,
             light,
             "shaft-masks:samples=256,target-error=none",
@@ -272,7 +273,6 @@ fn errors_are_within_their_bounds() {
             "{name}: {coarse}, {fine}"
         );
     }
-    support::assert_no_messages(&renderer.destroy().unwrap());
 }
 
 /// The part of a unit disk left of x.
@@ -316,18 +316,10 @@ fn no_bound_is_exceeded_on_closed_forms() {
         ("slot", slot, &between),
         ("overlap", overlapping, &both),
     ];
-    let mut renderer: Option<FrameRenderer<'static>> = None;
     for (name, primitives, free) in cases {
         for shape in [square, disk] {
             let scene = plates::scene(primitives.clone(), shape);
-            let renderer = match &mut renderer {
-                Some(renderer) => {
-                    renderer.set_scene(scene).unwrap();
-                    renderer
-                }
-                none => none.insert(FrameRenderer::owning(support::gpu(), scene).unwrap()),
-            };
-            let (seen, bound) = bounded(renderer, &plates::camera(), 0, "shaft-masks");
+            let (seen, bound) = bounded(&scene, &plates::camera(), 0, "shaft-masks");
             let (mut worst, mut partly) = (0.0f64, 0);
             for (i, (seen, bound)) in seen.iter().zip(&bound).enumerate() {
                 let [from, to] = free(f64::from(floor_x(i as u32 % SIZE[0])));
@@ -348,5 +340,4 @@ fn no_bound_is_exceeded_on_closed_forms() {
             assert!(partly > 500);
         }
     }
-    support::assert_no_messages(&renderer.unwrap().destroy().unwrap());
 }

@@ -3,7 +3,7 @@
 
 mod support;
 
-use antumbra::capture::{FrameRenderer, FrameRequest};
+use antumbra::capture::FrameRequest;
 use antumbra::light::LightShape;
 use antumbra::scene::{AlphaMode, Material, Primitive, Scene, Texture, TextureImage, Wrap};
 use antumbra::shadow::Technique;
@@ -23,20 +23,19 @@ fn disk(count: u32) -> impl Iterator<Item = [f32; 2]> {
 }
 
 fn render(scene: &Scene, techniques: &[&str]) -> Vec<Vec<f32>> {
-    let mut renderer = FrameRenderer::new(support::gpu(), scene).unwrap();
-    let images = techniques.iter().map(|technique| {
-        let request = FrameRequest {
-            camera: camera(),
-            size: [SIZE; 2],
-            lights: vec![0],
-            technique: technique.parse().unwrap(),
-        };
-        let mut frame = renderer.render(&request).unwrap();
-        frame.lights.remove(0).visibility
-    });
-    let images = images.collect();
-    support::assert_no_messages(&renderer.destroy().unwrap());
-    images
+    support::rig::with_renderer(scene, |renderer| {
+        let images = techniques.iter().map(|technique| {
+            let request = FrameRequest {
+                camera: camera(),
+                size: [SIZE; 2],
+                lights: vec![0],
+                technique: technique.parse().unwrap(),
+            };
+            let mut frame = renderer.render(&request).unwrap();
+            frame.lights.remove(0).visibility
+        });
+        images.collect()
+    })
 }
 
 /// Part of a level disk light that level rectangles (depth, x range, z range) leave free of a point.
@@ -409,12 +408,13 @@ fn a_finely_meshed_bowl_does_not_shadow_itself() {
         bowl.indices.extend([a, b, c, c, b, d]);
     }
     let small = LightShape::Disk { radius: 0.1 };
-    let images = render(&scene(vec![bowl], small), &["hard", "ssoc"]);
+    let bowl = scene(vec![bowl], small);
+    let images = render(&bowl, &["hard", "ssoc"]);
     // A device with 16 steps to a texel bends triangles of a texel's width more than the mesh does: 71 of
     // 4096 pixels of SwiftShader.
-    let gpu = support::gpu();
-    let few_steps = gpu.info().limits.sub_pixel_precision_bits < 8;
-    support::assert_no_messages(&gpu.destroy().unwrap());
+    let few_steps = support::rig::with_renderer(&bowl, |renderer| {
+        renderer.gpu().info().limits.sub_pixel_precision_bits < 8
+    });
     let most = if few_steps { 80 } else { 0 };
     for image in images {
         let dark = image.iter().filter(|v| **v < 0.99).count();
@@ -433,20 +433,20 @@ fn crowded_maps_are_counted() {
     let technique: Technique = "ssoc".parse().unwrap();
     let counted = |radius: f32| {
         let scene = under(&row, LightShape::Disk { radius });
-        let mut renderer = FrameRenderer::owning(support::gpu(), scene).unwrap();
         let request = FrameRequest {
             camera: camera(),
             size: [SIZE; 2],
             lights: vec![0],
             technique,
         };
-        let plain = renderer.render(&request).unwrap();
-        assert!(plain.lights[0].counters.is_empty());
-        assert!(!plain.report.passes.iter().any(|p| p.contains("collisions")));
-        let counted = renderer.render_counted(&request).unwrap();
-        assert_eq!(counted.lights[0].visibility, plain.lights[0].visibility);
-        support::assert_no_messages(&renderer.destroy().unwrap());
-        counted.lights[0].counters.clone()
+        support::rig::with_renderer(&scene, |renderer| {
+            let plain = renderer.render(&request).unwrap();
+            assert!(plain.lights[0].counters.is_empty());
+            assert!(!plain.report.passes.iter().any(|p| p.contains("collisions")));
+            let counted = renderer.render_counted(&request).unwrap();
+            assert_eq!(counted.lights[0].visibility, plain.lights[0].visibility);
+            counted.lights[0].counters.clone()
+        })
     };
     let share = |counters: &BTreeMap<String, u64>| {
         counters["crowded_texels"] as f64 / counters["band_texels"] as f64
@@ -476,15 +476,15 @@ fn a_floor_is_not_darkened_by_its_border() {
         lights: vec![0],
         technique: technique.parse().unwrap(),
     };
-    let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
-    let [hard, soft] = ["hard", "ssoc"].map(|technique| {
-        let frame = renderer.render(&request(technique)).unwrap();
-        frame.lights[0].visibility.clone()
+    let [hard, soft] = support::rig::with_renderer(&scene, |renderer| {
+        ["hard", "ssoc"].map(|technique| {
+            let frame = renderer.render(&request(technique)).unwrap();
+            frame.lights[0].visibility.clone()
+        })
     });
     // Where a ball leaves the light's centre in sight, it leaves half of the light.
     let dark = |(v, w): &(&f32, &f32)| **v == 1.0 && **w < 0.4;
     let wrong = hard.iter().zip(&soft).filter(dark).count();
     println!("{wrong} of {} pixels", hard.len());
     assert!(wrong * 500 < hard.len(), "{wrong} pixels");
-    support::assert_no_messages(&renderer.destroy().unwrap());
 }

@@ -12,6 +12,7 @@ pub mod glsl;
 pub mod host;
 pub mod plates;
 pub mod reflect;
+pub mod rig;
 pub mod work;
 
 use std::path::Path;

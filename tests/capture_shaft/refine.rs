@@ -1,50 +1,42 @@
 //! More samples for the tiles of `shaft-masks` that need them.
-#![cfg(feature = "cli")]
 
-mod support;
-
-use antumbra::capture::{FrameRenderer, FrameRequest, Samples};
-use antumbra::scene::{LoadOptions, Scene};
-use std::path::Path;
+use super::load;
+use crate::support::{self, rig::with_renderer};
+use antumbra::capture::{FrameRequest, Samples};
+use antumbra::scene::Scene;
 
 const SIZE: usize = 32;
 const TILE: usize = 8;
 
 /// Visibility of the first light of a scene.
 struct Views {
-    renderer: FrameRenderer<'static>,
     scene: Scene,
 }
 
 impl Views {
     fn of(name: &str) -> Self {
-        let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
-        let scene = Scene::load(assets.join(name), &LoadOptions::default()).unwrap();
-        let renderer = FrameRenderer::owning(support::gpu(), scene.clone()).unwrap();
-        Self { renderer, scene }
+        Self { scene: load(name) }
     }
 
-    fn see(&mut self, options: &str) -> Vec<f32> {
+    fn see(&self, options: &str) -> Vec<f32> {
         self.see_with(options, &[]).0
     }
 
-    fn see_with(&mut self, options: &str, images: &[&str]) -> (Vec<f32>, Vec<Vec<f32>>) {
+    fn see_with(&self, options: &str, images: &[&str]) -> (Vec<f32>, Vec<Vec<f32>>) {
         let request = FrameRequest {
             camera: self.scene.select_camera(None).unwrap(),
             size: [SIZE as u32; 2],
             lights: vec![0],
             technique: format!("shaft-masks:{options}").parse().unwrap(),
         };
-        let mut frame = self.renderer.render_with_images(&request, images).unwrap();
+        let mut frame = with_renderer(&self.scene, |renderer| {
+            renderer.render_with_images(&request, images).unwrap()
+        });
         let planes = frame.images.iter().map(|image| match &image.planes[0] {
             Samples::Float(values) => values.clone(),
             other => panic!("{other:?}"),
         });
         (frame.lights.remove(0).visibility, planes.collect())
-    }
-
-    fn end(self) {
-        support::assert_no_messages(&self.renderer.destroy().unwrap());
     }
 }
 
@@ -82,14 +74,14 @@ fn rms(image: &[f32], truth: &[f32]) -> f64 {
 #[test]
 fn tiles_get_more_samples_where_they_need_them() {
     let _one = support::serial();
-    let mut views = Views::of("lights.gltf");
-    let with_bound = |views: &mut Views, options: &str| {
+    let views = Views::of("lights.gltf");
+    let with_bound = |views: &Views, options: &str| {
         let (image, bounds) = views.see_with(options, &["visibility_bound"]);
         (image, bounds.into_iter().next().unwrap())
     };
-    let (few, coarse) = with_bound(&mut views, "target-error=none");
+    let (few, coarse) = with_bound(&views, "target-error=none");
     let more = views.see("target-error=none,samples=256");
-    let (most, fine) = with_bound(&mut views, "target-error=none,samples=1024");
+    let (most, fine) = with_bound(&views, "target-error=none,samples=1024");
     let pictures = [&few[..], &more, &most];
     let all = rms(&few, &most);
 
@@ -120,7 +112,7 @@ fn tiles_get_more_samples_where_they_need_them() {
 
     let most_bound = 0.2;
     let options = format!("target-error=none,bound={most_bound}");
-    let (_, within) = with_bound(&mut views, &options);
+    let (_, within) = with_bound(&views, &options);
     let over = |bounds: &[f32]| bounds.iter().filter(|b| **b > most_bound).count();
     let counts = [&coarse, &fine, &within].map(|bounds| over(bounds));
     println!("above the bound: {counts:?} with 64, 1024 and as many samples as are needed");
@@ -132,5 +124,4 @@ fn tiles_get_more_samples_where_they_need_them() {
     }
     let mut pairs = within.iter().zip(&fine);
     assert!(pairs.any(|(b, fine)| b > fine), "no more than asked for");
-    views.end();
 }

@@ -17,8 +17,13 @@ export NODEVICE_SELECT=1
 # Variables set outside would win over those of .cargo/config.toml.
 unset VK_LAYER_PATH VK_ADD_LAYER_PATH LP_NATIVE_VECTOR_WIDTH
 
+# Nothing is built in small steps in a fresh clone: bookkeeping for later builds would cost a sixth of the time.
+if [ ! -d "${CARGO_TARGET_DIR:-target}/debug/incremental" ]; then export CARGO_INCREMENTAL=0; fi
+
 # Tests that open a Vulkan device run one at a time, or they measure and starve each other.
 gpu_tests=()
+# Those of them that are asked on every driver.
+driver_tests=()
 other_tests=()
 for file in tests/*.rs tests/*/main.rs; do
     [ -f "$file" ] || continue
@@ -26,8 +31,13 @@ for file in tests/*.rs tests/*/main.rs; do
     name=${name%.rs}
     name=${name%/main}
     case $name in
-        capture_stress) ;; # see gpu_jobs
-        gpu_* | shader_* | capture* | cli* | embed* | host* | golden*) gpu_tests+=(--test "$name") ;;
+        capture_stress) ;; # see stress_job
+        # Jobs and shards, reports, files, the ray tracer, SPIR-V: the same whatever the driver.
+        cli_batch | cli_bench | cli_reference | shader_modules) gpu_tests+=(--test "$name") ;;
+        gpu_* | shader_* | capture* | cli* | embed* | host* | golden*)
+            gpu_tests+=(--test "$name")
+            driver_tests+=(--test "$name")
+            ;;
         *) other_tests+=(--test "$name") ;;
     esac
 done
@@ -84,25 +94,32 @@ show_jobs() {
         printf '%s\n' "--- ${summary[-1]}"
     done
 }
-# gpu_jobs NAME [FILTER]: with a filter, only what may depend on the driver, and those of the stress scenes.
-gpu_jobs() {
+# What of the other files is the same whatever the driver: that the validation layer sees a missing barrier,
+# arguments and file names of the program.
+anywhere=(random_graphs_without_one_of_their_barriers failures::
+    help_and_version_go formats_follow_the_ending lights_are_chosen_by an_image_says_how_bright
+    a_report_counts_tiles a_scene_without_a_camera_is graph_prints_the_plan techniques_are_listed
+    wrong_names_of_images_exit_2 light_in_the_name_of_a_picture)
+gpu_job() {
     if [ ${#gpu_tests[@]} -eq 0 ]; then return; fi
-    local tests=("${gpu_tests[@]}") skip=()
-    if [ $# -gt 1 ]; then
-        # What shows that the validation layer sees a missing barrier, and jobs and shards.
-        skip=(--skip random_graphs_without_one_of_their_barriers)
-        tests=()
-        local name
-        for name in "${gpu_tests[@]}"; do
-            case $name in
-                cli_batch) unset 'tests[-1]' ;;
-                *) tests+=("$name") ;;
-            esac
-        done
-    fi
-    start_job "GPU tests on $1" cargo test "${tests[@]}" -- --test-threads=1 "${skip[@]}"
-    # All relations over all stress scenes take minutes: once, and elsewhere each scene by itself.
+    start_job "GPU tests on $1" cargo test "${gpu_tests[@]}" -- --test-threads=1
+}
+driver_job() {
+    if [ ${#driver_tests[@]} -eq 0 ]; then return; fi
+    local skip=() name
+    for name in "${anywhere[@]}"; do skip+=(--skip "$name"); done
+    start_job "GPU tests on $1" cargo test "${driver_tests[@]}" -- --test-threads=1 "${skip[@]}"
+}
+# stress_job NAME [FILTER]
+stress_job() {
     start_job "stress scenes on $1" cargo test --test capture_stress -- --test-threads=1 "${@:2}"
+}
+# on DRIVER JOB [FILTER]: where set-up could unpack that driver, what may depend on it.
+on() {
+    if [ ! -f ".deps/vulkan/$1/version" ]; then return; fi
+    use_driver "$PWD/.deps/vulkan/$1/icd.json"
+    "$2" "$1 of $(cat ".deps/vulkan/$1/version")" "${@:3}"
+    use_driver "$lavapipe"
 }
 
 step "format" cargo fmt --check
@@ -113,14 +130,17 @@ step "documentation examples" cargo test --doc
 step "documentation" env RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
 
 step "build of the GPU tests" cargo test --no-run "${gpu_tests[@]}" --test capture_stress
-# The longest first, so that both processes end at about the same time.
-for driver in swiftshader lavapipe; do
-    if [ ! -f ".deps/vulkan/$driver/version" ]; then continue; fi
-    use_driver "$PWD/.deps/vulkan/$driver/icd.json"
-    gpu_jobs "$driver of $(cat ".deps/vulkan/$driver/version")" every_case
-done
-use_driver "$lavapipe"
-gpu_jobs "the system's lavapipe"
+# Drivers ask for the same truth.
+export ANTUMBRA_TEST_TRUTH=$jobs_dir/truth
+mkdir "$ANTUMBRA_TEST_TRUTH"
+# The longest first, so that both processes end at about the same time. All relations over all stress scenes take
+# minutes: once, and elsewhere each scene by itself.
+on swiftshader driver_job
+stress_job "the system's lavapipe"
+gpu_job "the system's lavapipe"
+on swiftshader stress_job every_case
+on lavapipe driver_job
+on lavapipe stress_job every_case
 show_jobs
 
 printf '\n'

@@ -9,8 +9,10 @@ mod reflect;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glsl::{Goal, kind_of};
 use reflect::{Kind, Reflection};
@@ -50,6 +52,7 @@ fn run() -> Result<(), String> {
     let mut statics = String::new();
     let mut names: BTreeMap<String, String> = BTreeMap::new();
     let mut problems = Vec::new();
+    let mut jobs = Vec::new();
     for path in &files {
         let name = shader_name(&root, path);
         let constant = constant_name(&name);
@@ -59,7 +62,30 @@ fn run() -> Result<(), String> {
             ));
             continue;
         }
-        match compile(&root, path, &name, &constant, &out) {
+        jobs.push((path, name, constant));
+    }
+    // On all cores: this is a good part of a small build.
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        while let Some((path, name, constant)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
+            done.push((name, compile(&root, path, name, constant, &out)));
+        }
+        done
+    };
+    let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let mut results = Vec::new();
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        for worker in workers {
+            let done = worker.join();
+            results.extend(done.map_err(|_| "a thread that compiles shaders panicked")?);
+        }
+        Ok::<_, &str>(())
+    })?;
+    results.sort_by_key(|(name, _)| *name);
+    for (_, result) in results {
+        match result {
             Ok(code) => statics.push_str(&code),
             Err(problem) => problems.push(problem),
         }

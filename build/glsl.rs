@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
+use std::sync::Once;
 
 use shaderc::{
     CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind,
@@ -52,6 +53,9 @@ pub fn compile(
 ) -> Result<Compiled, String> {
     let includes = RefCell::new(BTreeSet::new());
     let failed = |e: shaderc::Error| format!("{file}: {e}");
+    // The last compiler to go takes the tables of built-in functions with it, which cost more than a shader.
+    static TABLES: Once = Once::new();
+    TABLES.call_once(|| std::mem::forget(Compiler::new()));
     let compiler = Compiler::new().map_err(failed)?;
     let mut options = CompileOptions::new().map_err(failed)?;
     options.set_source_language(SourceLanguage::GLSL);

@@ -15,6 +15,7 @@ pub mod reflect;
 pub mod rig;
 pub mod work;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -80,10 +81,24 @@ pub fn glsl_root() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl")
 }
 
-/// Compiles a GLSL source of a test into a shader that lives as long as the process. Includes come
-/// from `glsl/`.
+/// Compiles a GLSL source of a test into a shader that lives as long as the process, the same one when it is asked for
+/// again. Includes come from `glsl/`.
 #[track_caller]
 pub fn compile(stage: vk::ShaderStageFlags, source: &str) -> &'static Shader {
+    type Compiled = BTreeMap<(u32, String), &'static Shader>;
+    static COMPILED: Mutex<Compiled> = Mutex::new(BTreeMap::new());
+    let compiled = || COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (stage.as_raw(), source.to_owned());
+    if let Some(shader) = compiled().get(&key) {
+        return shader;
+    }
+    let shader = compile_anew(stage, source);
+    compiled().insert(key, shader);
+    shader
+}
+
+#[track_caller]
+fn compile_anew(stage: vk::ShaderStageFlags, source: &str) -> &'static Shader {
     let (kind, file) = match stage {
         vk::ShaderStageFlags::VERTEX => (shaderc::ShaderKind::Vertex, "test.vert"),
         vk::ShaderStageFlags::FRAGMENT => (shaderc::ShaderKind::Fragment, "test.frag"),

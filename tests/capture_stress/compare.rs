@@ -22,8 +22,12 @@ const FINER: u32 = 3;
 /// single precision cannot tell the sides.
 const EDGE_ON: f64 = 1.0e-5;
 
-pub fn known(case: &Case) -> Known {
-    let reference = Reference::new(&case.scene).unwrap();
+/// [`Known::sure`] of a case.
+pub fn sure(case: &Case) -> Vec<bool> {
+    sure_of(&Reference::new(&case.scene).unwrap(), case)
+}
+
+fn sure_of(reference: &Reference<'_>, case: &Case) -> Vec<bool> {
     let light = case.area_light();
     let settings = Settings {
         camera: &case.camera,
@@ -42,9 +46,14 @@ pub fn known(case: &Case) -> Known {
         };
         *sure = surface.normal.dot(to_light) > EDGE_ON * to_light.length();
     }
+    sure
+}
+
+pub fn known(case: &Case) -> Known {
+    let reference = Reference::new(&case.scene).unwrap();
     let wide = SIDE * FINER;
     let finer = reference
-        .center_visibility(&case.camera, [wide; 2], light)
+        .center_visibility(&case.camera, [wide; 2], case.area_light())
         .unwrap();
     let at = |x: u32, y: u32| finer[(y * wide + x) as usize];
     let middle = |i: u32| (i % SIDE * FINER + FINER / 2, i / SIDE * FINER + FINER / 2);
@@ -65,7 +74,7 @@ pub fn known(case: &Case) -> Known {
                 at(x, y)
             })
             .collect(),
-        sure,
+        sure: sure_of(&reference, case),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The same case in other guises, and a small step from where it was.
 
-use crate::compare::{Change, flipped, known};
-use crate::limits::{MAY_FLIP, judge, limits, techniques};
+use crate::compare::{Change, flipped, known, sure};
+use crate::limits::{MAY_FLIP, is_quick, judge, limits, techniques};
 use crate::rig::{PIXELS, Rig};
 use crate::support;
 use antumbra::shadow::Technique;
@@ -11,8 +11,7 @@ use glam::{DQuat, DVec3, EulerRot, Vec3};
 /// Whether the case of this number is asked of a technique: one that takes its light, and every other
 /// one of those whose frames take long. `scenes::every_case` leaves none out.
 fn is_asked(technique: Technique, case: &Case, number: usize) -> bool {
-    let slow = ["mdi", "shaft-masks"].contains(&technique.name());
-    technique.check(case.area_light()).is_ok() && !(slow && number % 2 == 1)
+    technique.check(case.area_light()).is_ok() && (is_quick(technique) || number.is_multiple_of(2))
 }
 
 /// A uniform scale, and a place far away that is taken out when the file is read, change no more than
@@ -35,15 +34,18 @@ fn scaled_or_far_away() {
             let distances = [1.0e-4, 1.0e-2, 1.0];
             guises.extend(distances.map(|part| case.through_file(part * far).unwrap()));
         }
-        let mut known: Vec<_> = guises.iter().map(|guise| known(guise).sure).collect();
-        let here = crate::compare::known(case).sure;
+        let guises: Vec<_> = guises
+            .into_iter()
+            .map(|guise| (sure(&guise), guise))
+            .collect();
+        let here = sure(case);
         for technique in techniques() {
             if !is_asked(technique, case, number) {
                 continue;
             }
-            let before = rig.draw(case, technique);
+            let before = rig.draw_once(case, technique);
             let mut line = format!("{:28} {:5}", case.name, technique.name());
-            for (guise, sure) in guises.iter().zip(&mut known) {
+            for (sure, guise) in &guises {
                 let after = rig.draw(guise, technique);
                 let change = Change::of(&before, &after, |i| here[i] && sure[i], 1.0e-3);
                 line += &format!(" {}/{:.2}", change.changed, change.most);
@@ -73,17 +75,17 @@ fn turned_moved_or_mirrored() {
         shift: DVec3::new(9.0, -4.0, 7.0),
     };
     for (number, case) in cases().into_iter().enumerate() {
-        let here = known(&case);
+        let here = sure(&case);
         let turned = case.seen_as(&similarity);
         let mirrored = case.mirrored();
-        let there = known(&turned).sure;
+        let there = sure(&turned);
         for technique in techniques() {
             if !is_asked(technique, &case, number) {
                 continue;
             }
             let limits = limits(technique);
-            let before = rig.draw(&case, technique);
-            let sure = |i: usize| here.sure[i] && there[i];
+            let before = rig.draw_once(&case, technique);
+            let sure = |i: usize| here[i] && there[i];
             let found = rig.draw(&turned, technique);
             let image = flipped(&rig.draw(&mirrored, technique));
             for (guise, after) in [("turned", found), ("mirrored", image)] {
@@ -141,7 +143,7 @@ fn a_small_move_is_a_small_change() {
                     continue;
                 }
                 let limits = limits(technique);
-                let before = rig.draw(&case, technique);
+                let before = rig.draw_once(&case, technique);
                 let after = rig.draw(&moved, technique);
                 let change = Change::of(&before, &after, sure, limits.jump);
                 let title = format!("{:28} {:5} {what}", case.name, technique.name());

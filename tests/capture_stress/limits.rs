@@ -197,6 +197,11 @@ pub fn techniques() -> impl Iterator<Item = Technique> {
     Technique::ALL.iter().copied()
 }
 
+/// Whether frames of a technique take milliseconds; those of the others take up to a second on some drivers.
+pub fn is_quick(technique: Technique) -> bool {
+    !["mdi", "shaft-masks"].contains(&technique.name())
+}
+
 /// Fails on any fault.
 #[track_caller]
 pub fn judge(faults: &[String]) {

@@ -3,6 +3,8 @@
 use antumbra::capture::{FrameRenderer, FrameRequest};
 use antumbra::shadow::Technique;
 use antumbra::stress::Case;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Pictures' sides in pixels.
 pub const SIDE: u32 = 64;
@@ -53,6 +55,22 @@ impl Rig {
             );
         }
         visibility
+    }
+
+    /// As [`draw`](Self::draw), but a picture that any test of this process has drawn is not drawn again:
+    /// `scenes::every_case` shows that it would be the same. Cases are told by their names.
+    #[track_caller]
+    pub fn draw_once(&mut self, case: &Case, technique: Technique) -> Arc<Vec<f32>> {
+        static DRAWN: Mutex<Option<HashMap<String, Arc<Vec<f32>>>>> = Mutex::new(None);
+        let name = format!("{} {technique:?}", case.name);
+        let drawn = || DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(picture) = drawn().get_or_insert_default().get(&name) {
+            return picture.clone();
+        }
+        let picture = Arc::new(self.draw(case, technique));
+        let mut drawn = drawn();
+        drawn.get_or_insert_default().insert(name, picture.clone());
+        picture
     }
 
     /// Ends the device; the validation layer must have been silent.

@@ -3,7 +3,7 @@
 
 mod support;
 
-use antumbra::capture::FrameRequest;
+use antumbra::capture::{FrameRenderer, FrameRequest};
 use antumbra::light::{AreaLight, LightShape};
 use antumbra::scene::{AlphaMode, Material, Primitive, Scene, SceneCamera};
 use glam::Vec3;
@@ -320,21 +320,20 @@ fn a_far_camera_sees_no_black_pixels_near_the_origin() {
             yfov: 0.04,
             ..camera()
         };
-        let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
         let request = FrameRequest {
             camera,
             size: [SIZE; 2],
             lights: vec![0],
             technique: "dbuffer".parse().unwrap(),
         };
-        let image = renderer
-            .render(&request)
-            .unwrap()
-            .lights
-            .remove(0)
-            .visibility;
-        support::assert_no_messages(&renderer.destroy().unwrap());
-        image
+        support::rig::with_renderer(&scene, |renderer| {
+            renderer
+                .render(&request)
+                .unwrap()
+                .lights
+                .remove(0)
+                .visibility
+        })
     };
     let (near, far) = (image(0.0), image(64.0));
     let off = near.iter().zip(&far).map(|(a, b)| (a - b).abs());

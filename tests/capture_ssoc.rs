@@ -286,7 +286,16 @@ fn a_large_sphere_light_behind_a_ball() {
     let (middle, radius, light) = (Vec3::new(-2.0, 5.0, 0.0), 2.0, 1.35);
     let shape = LightShape::Sphere { radius: light };
     let scene = scene(vec![floor(), ball(middle, radius, 64)], shape);
-    let images = render(&scene, &["ssoc", "ssoc:lookups=1", "ssoc:lookups=1,bands=128", "ssoc:bands=128", "ssoc:lookups=32"]);
+    let images = render(
+        &scene,
+        &[
+            "ssoc",
+            "ssoc:lookups=1",
+            "ssoc:lookups=1,bands=128",
+            "ssoc:bands=128",
+            "ssoc:lookups=32",
+        ],
+    );
     let image = &images[0];
     let center = Vec3::new(0.0, HEIGHT, 0.0);
     // Rays from a point to the disk that it sees of the light.

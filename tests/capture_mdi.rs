@@ -268,8 +268,8 @@ fn work_is_left_out_and_counted(rig: &mut Rig) {
     assert!(unlit > 100 && (unlit..2 * unlit).contains(&counts[0]));
     let depths = early.counters["depths"];
     assert_eq!(early.counters["depths_listed"], depths);
-    // The floor fills the view but for its margin, and nothing else does.
-    assert!((240_000..330_000).contains(&depths), "{depths}");
+    // The bar covers a 20th of the view or less; the floor would fill it, but cannot block anything.
+    assert!((9_000..20_000).contains(&depths), "{depths}");
 }
 
 /// P Q (R + 8) + 4 S bytes for P Q texels, masks of R bytes and S depths: here with room for a number of

@@ -9,14 +9,12 @@ layout(set = 0, binding = 7, std430) buffer Arguments {
 layout(set = 0, binding = 8, r32ui) uniform writeonly uimage2D large_list;
 
 void main() {
-    uint triangle = invocation_triangle();
-    if (triangle < params.counts.w) {
-        if (cover_small(triangle)) {
-            uint index = atomicAdd(large.count, 1u);
-            if (index < LARGE_GROUPS) {
-                atomicAdd(large.groups_y, 1u);
-            }
-            imageStore(large_list, list_place(index), uvec4(triangle));
+    uint triangle;
+    if (invocation_triangle(triangle) && cover_small(triangle)) {
+        uint index = atomicAdd(large.count, 1u);
+        if (index < LARGE_GROUPS) {
+            atomicAdd(large.groups_y, 1u);
         }
+        imageStore(large_list, list_place(index), uvec4(triangle));
     }
 }

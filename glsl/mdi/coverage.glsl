@@ -19,6 +19,9 @@ layout(set = 0, binding = 4) uniform sampler2D texels;
 layout(push_constant) uniform Push {
     uint view;
     uint groups_across;
+    uint count;
+    uint unused;
+    uvec2 runs[14]; // of triangles. x: the invocation that it ends before, y: added to their numbers
 } push;
 
 // 1 where triangles of the scene may have holes.
@@ -225,10 +228,16 @@ void cover_large(uint triangle, int y) {
     }
 }
 
-// The triangle of an invocation of `cover_small`.
-uint invocation_triangle() {
+// The triangle of an invocation of `cover_small`; false if there is none.
+bool invocation_triangle(out uint triangle) {
     uint group = gl_WorkGroupID.y * push.groups_across + gl_WorkGroupID.x;
-    return group * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    uint invocation = group * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    uint run = 0u;
+    while (run < push.count && invocation >= push.runs[run].x) {
+        ++run;
+    }
+    triangle = run < push.count ? invocation + push.runs[run].y : 0u;
+    return run < push.count;
 }
 
 #endif

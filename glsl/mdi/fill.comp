@@ -4,8 +4,8 @@
 #include "mdi/fill.glsl"
 
 void main() {
-    uint triangle = invocation_triangle();
-    if (triangle < params.counts.w) {
+    uint triangle;
+    if (invocation_triangle(triangle)) {
         cover_small(triangle);
     }
 }

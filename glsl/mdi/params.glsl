@@ -19,7 +19,7 @@ const uint ALL_BOUNDARIES = 16u;
 const uint TESTED_SIDES = 32u;
 
 struct MdiParams {
-    uvec4 counts;  // views, texels across and down a view, depths that lists have room for, triangles
+    uvec4 counts;  // views, texels across and down a view, depths that lists have room for, 0
     uvec4 options; // buckets, 1 where surfaces mark the nearest boundary and 0 both of a bucket, rays,
                    // RANDOM_PLACES | PIXEL_FOOTPRINT | DITHERED_TEXELS | UNEVEN_LIGHT |
                    // ALL_BOUNDARIES | TESTED_SIDES

@@ -2,20 +2,39 @@
 
 use super::layers::LIST_WIDTH;
 use super::{NAME, ShadowInputs};
+use crate::geometry::Draw;
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, Shader, spirv};
 use crate::graph::{
     Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, ImagePart, PassBuilder,
     PassKind, Stage,
 };
 use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
 
 /// Most workgroups in one direction of a dispatch.
 const MOST_GROUPS: u32 = 32_768;
+
+/// Most runs of triangles: `runs` in `mdi/coverage.glsl`.
+const MOST_RUNS: usize = 14;
+
+/// `Push` in `mdi/coverage.glsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct Push {
+    view: u32,
+    groups_across: u32,
+    count: u32,
+    unused: u32,
+    runs: [[u32; 2]; MOST_RUNS],
+}
 
 /// What the passes of all views share.
 pub(super) struct Coverage {
     params: BufferId,
     constants: Vec<(u32, u32)>,
+    push: Push,
+    /// Of those that may block the light.
     triangles: u32,
     side: u32,
     /// Of the image of boundaries.
@@ -36,12 +55,23 @@ impl Coverage {
         inputs: &ShadowInputs<'_>,
         params: BufferId,
         side: u32,
-        finest: ImagePart,
+        (runs, finest): (&Runs, ImagePart),
     ) -> Self {
+        let triangles = runs.triangles();
+        let mut push = Push::zeroed();
+        push.count = runs.0.len() as u32;
+        let mut before = 0;
+        for (entry, run) in push.runs.iter_mut().zip(&runs.0) {
+            // Numbers of invocations that the run ends at, and what leads from them to its triangles.
+            let end = before + (run.end - run.start);
+            *entry = [end, run.start.wrapping_sub(before)];
+            before = end;
+        }
         Self {
             params,
+            push,
             constants: vec![(0, u32::from(inputs.scene.has_masks()))],
-            triangles: inputs.scene.triangle_count() as u32,
+            triangles,
             side,
             finest,
             large: Vec::new(),
@@ -157,6 +187,11 @@ impl Coverage {
             ..ComputePipelineDesc::new(shader)
         };
         let [groups, ..] = shader.groups([self.triangles, 1, 1]);
+        let push = Push {
+            view,
+            groups_across: groups.clamp(1, MOST_GROUPS),
+            ..self.push
+        };
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let mut bindings = vec![
@@ -167,11 +202,9 @@ impl Coverage {
                 Bind::sampled(4, ids.texels, nearest),
             ];
             bindings.extend(extra);
-            let across = groups.clamp(1, MOST_GROUPS);
-            let push = [view, across];
             let Some(large) = large else {
                 ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
-                ctx.dispatch([across, groups.div_ceil(across), 1]);
+                ctx.dispatch([push.groups_across, groups.div_ceil(push.groups_across), 1]);
                 return Ok(());
             };
             bindings.push(Bind::uniform(8, large.arguments));
@@ -187,5 +220,84 @@ impl Large {
         pass.read(self.arguments, Access::Indirect);
         pass.read(self.arguments, Access::Uniform(Stage::Compute));
         pass.read(self.list, Access::Sampled(Stage::Compute));
+    }
+}
+
+/// Triangles of a scene that may block the light: at most [`MOST_RUNS`] runs.
+#[derive(Debug, PartialEq)]
+pub(super) struct Runs(Vec<Range<u32>>);
+
+impl Runs {
+    /// Of the draws that may block; marks some more of them where there are too many gaps. The draws'
+    /// triangles follow each other.
+    pub(super) fn new(draws: &[Draw], blocks: &mut [bool]) -> Self {
+        let mut parts: Vec<Range<usize>> = Vec::new();
+        for index in (0..draws.len()).filter(|i| blocks[*i]) {
+            match parts.last_mut() {
+                Some(part) if part.end == index => part.end += 1,
+                _ => parts.push(index..index + 1),
+            }
+        }
+        let triangles = |part: &Range<usize>| {
+            let (first, last) = (&draws[part.start], &draws[part.end - 1]);
+            first.first_index / 3..(last.first_index + last.index_count) / 3
+        };
+        while parts.len() > MOST_RUNS {
+            let gap = |i: &usize| triangles(&(parts[*i].end..parts[*i + 1].start)).len();
+            let least = (0..parts.len() - 1).min_by_key(gap).unwrap_or(0);
+            parts[least].end = parts.remove(least + 1).end;
+        }
+        for part in &parts {
+            blocks[part.clone()].fill(true);
+        }
+        Self(parts.iter().map(triangles).collect())
+    }
+
+    fn triangles(&self) -> u32 {
+        self.0.iter().map(|run| run.len() as u32).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Aabb;
+
+    fn draws(counts: &[u32]) -> Vec<Draw> {
+        let mut first_index = 0;
+        let mut next = |triangles: &u32| {
+            let draw = Draw {
+                first_index,
+                index_count: 3 * triangles,
+                bounds: Aabb::EMPTY,
+                corners: [glam::Vec3::ZERO; 8],
+                mask: None,
+            };
+            first_index += draw.index_count;
+            draw
+        };
+        counts.iter().map(&mut next).collect()
+    }
+
+    #[test]
+    fn runs_are_those_of_what_blocks() {
+        let mut blocks = [true, true, false, true];
+        let runs = Runs::new(&draws(&[2, 3, 4, 5]), &mut blocks);
+        assert_eq!(runs.0, [0..5, 9..14]);
+        assert_eq!(runs.triangles(), 10);
+        assert_eq!(Runs::new(&draws(&[2]), &mut [false]).0, []);
+    }
+
+    #[test]
+    fn small_gaps_are_closed_where_there_are_too_many() {
+        // Every other draw blocks; the gaps grow by a triangle each.
+        let counts: Vec<u32> = (0..2 * MOST_RUNS as u32 + 3).map(|i| 1 + i / 2).collect();
+        let mut blocks: Vec<bool> = (0..counts.len()).map(|i| i % 2 == 0).collect();
+        let runs = Runs::new(&draws(&counts), &mut blocks);
+        assert_eq!(runs.0.len(), MOST_RUNS);
+        let kept = blocks.iter().filter(|blocks| !**blocks).count();
+        assert_eq!(kept, MOST_RUNS - 1);
+        assert!(blocks[1] && blocks[3] && !blocks[5]);
+        assert_eq!(runs.0[0], 0..1 + 1 + 2 + 2 + 3);
     }
 }

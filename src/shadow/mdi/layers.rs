@@ -1,6 +1,6 @@
 //! The multi-layer depth image: for each texel a mask of buckets and a sorted list of depths.
 
-use super::coverage::Coverage;
+use super::coverage::{Coverage, Runs};
 use super::options::MdiOptions;
 use super::views::MdiViews;
 use super::{NAME, ShadowInputs};
@@ -42,7 +42,7 @@ pub(super) fn add_layers<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
     options: &MdiOptions,
-    views: &MdiViews,
+    (views, runs): (&MdiViews, &Runs),
 ) -> Layers {
     let name = &inputs.light_name;
     let (params, rays) = add_params(graph, name, views);
@@ -75,7 +75,7 @@ pub(super) fn add_layers<'f>(
         ctx.clear_image(tally, [0.0; 4])?;
         ctx.clear_image(boundaries, [0.0; 4])
     });
-    let mut coverage = Coverage::new(inputs, params, side, level(0));
+    let mut coverage = Coverage::new(inputs, params, side, (runs, level(0)));
     for view in 0..views.count {
         [counts, boundaries] = coverage.add_count(graph, inputs, view, [counts, boundaries]);
     }

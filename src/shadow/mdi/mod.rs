@@ -1,8 +1,8 @@
 //! Technique `mdi`: depth-dependent filtering of multi-layer depth images (B. Keating, N. Max,
 //! Eurographics Workshop on Rendering 1999).
 //!
-//! A view from the light's centre keeps all surfaces at each texel: a mask of the depth buckets that
-//! hold any, and a sorted list of their depths. From each pixel's surface a fan of rays goes to the
+//! A view from the light's centre keeps, of what can stand between light and picture, all surfaces at
+//! each texel: a mask of the depth buckets that hold any, and a sorted list of their depths. From each pixel's surface a fan of rays goes to the
 //! light; where a ray crosses the boundary between two buckets, their bits at that texel say whether
 //! it is blocked. Where the receiver's own plane passes through these buckets, the depths in the
 //! list are compared with it instead.
@@ -33,9 +33,11 @@ mod views;
 pub use options::{Buckets, Footprint, MdiOptions};
 
 use super::receivers::add_receivers;
+use super::unblocked::add_unblocked;
 use super::{ShadowInputs, ShadowMask, Tally, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, Graph, PassKind, Stage};
+use coverage::Runs;
 use layers::Layers;
 
 /// The technique's name.
@@ -47,18 +49,25 @@ pub(super) fn add_passes<'f>(
     inputs: &ShadowInputs<'f>,
     options: MdiOptions,
 ) -> ShadowMask {
+    let draws = inputs.scene.draws();
+    let light = &inputs.light;
+    let none = !inputs.casters.contains(&true);
+    if none && !light.is_uneven() {
+        return ShadowMask::new(add_unblocked(graph, inputs, NAME));
+    }
+    // What of an uneven light is above a horizon takes rays, and rays a view.
+    let mut blocks: Vec<_> = inputs
+        .casters
+        .iter()
+        .map(|blocks| *blocks || none)
+        .collect();
+    let runs = Runs::new(draws, &mut blocks);
     // Boxes that turn with the triangles grow less around what is turned.
-    let boxes: Vec<_> = (inputs.scene.draws().iter().map(|draw| draw.corners)).collect();
+    let boxes: Vec<_> = draws.iter().map(|draw| draw.corners).collect();
     let size = inputs.camera.size();
-    let triangles = inputs.scene.triangle_count() as u32;
-    let views = views::mdi_views(
-        &inputs.light,
-        &inputs.receivers,
-        &boxes,
-        triangles,
-        (&options, size),
-    );
-    let layers = layers::add_layers(graph, inputs, &options, &views);
+    let casters = (boxes.as_slice(), blocks.as_slice());
+    let views = views::mdi_views(light, &inputs.receivers, casters, (&options, size));
+    let layers = layers::add_layers(graph, inputs, &options, (&views, &runs));
     add_visibility(graph, inputs, &layers)
 }
 

@@ -44,15 +44,19 @@ pub(super) struct MdiViews {
 }
 
 /// Views that look at all receivers, and at all blockers of their light but for what is nearer to the
-/// light than a 64th of its reach. `casters`: corners of boxes, x changing fastest, then y; scene space,
-/// metres. `picture`: its size in pixels.
+/// light than a 64th of its reach. `boxes`: corners of the scene's, x changing fastest, then y; scene
+/// space, metres; `blocks`: which of them may block the light. `picture`: its size in pixels.
 pub(super) fn mdi_views(
     light: &AreaLight,
     receivers: &[Vec<DVec3>],
-    casters: &[[Vec3; 8]],
-    triangles: u32,
+    (boxes, blocks): (&[[Vec3; 8]], &[bool]),
     (options, picture): (&MdiOptions, [u32; 2]),
 ) -> MdiViews {
+    let pairs = boxes.iter().zip(blocks);
+    let casters: Vec<_> = pairs
+        .filter(|(_, blocks)| **blocks)
+        .map(|(b, _)| *b)
+        .collect();
     let corners = || casters.iter().flatten().map(|corner| corner.as_dvec3());
     let mut around = Aabb::EMPTY;
     casters.iter().flatten().for_each(|p| around.insert(*p));
@@ -77,7 +81,8 @@ pub(super) fn mdi_views(
     };
     let count = views.views.len() as u32;
     let across = views.views.first().map_or(0.0, |view| {
-        penumbra_across(view, 2.0 * reach, corners().map(|p| p - center), sun)
+        let corners = boxes.iter().flatten().map(|p| p.as_dvec3() - center);
+        penumbra_across(view, 2.0 * reach, corners, sun)
     });
     let size = options.side(picture, count, across);
     let room = u64::from(options.depths) * u64::from(size * size) * u64::from(count.max(1));
@@ -87,7 +92,7 @@ pub(super) fn mdi_views(
     let ray_count = if hard { 1 } else { options.rays };
     let origin = if sun { DVec3::ZERO } else { center };
     let mut params = MdiParams {
-        counts: [count, size, capacity, triangles],
+        counts: [count, size, capacity, 0],
         options: [
             options.buckets,
             u32::from(options.nearest),
@@ -164,7 +169,7 @@ pub(super) fn mdi_views(
 }
 
 /// Width of a usual penumbra as a part of the view's width: of a blocker a fifth of the way to the light
-/// before the farthest receiver, under a sun a twentieth of the casters' depth, of which the ground fills
+/// before the farthest receiver, under a sun a twentieth of the scene's depth, of which the ground fills
 /// much. `wide`: the light's width in metres, of a sun at distance 1; `corners`: from the light.
 fn penumbra_across(
     view: &LightView,

@@ -50,6 +50,22 @@ fn truth(p: Vec3, radius: f32, plates: &[(f32, [f32; 2], [f32; 2])], samples: u3
     free.count() as f32 / samples as f32
 }
 
+/// As [`truth`], of a light that falls from 1 in its middle to 0 at its rim, as 1 - s^2.
+fn truth_of_falloff(p: Vec3, plates: &[(f32, [f32; 2], [f32; 2])]) -> f32 {
+    let (mut free, mut all) = (0.0, 0.0);
+    for [u, v] in disk(20_000) {
+        let power = 1.0 - u * u - v * v;
+        let from = Vec3::new(u, HEIGHT, v);
+        let blocked = plates.iter().any(|(depth, x, z)| {
+            let at = from + (p - from) * (depth / (HEIGHT - p.y));
+            (x[0]..=x[1]).contains(&at.x) && (z[0]..=z[1]).contains(&at.z)
+        });
+        free += if blocked { 0.0 } else { power };
+        all += power;
+    }
+    free / all
+}
+
 const ENDLESS: [f32; 2] = [-30.0, 30.0];
 
 fn under(plates: &[(f32, [f32; 2], [f32; 2])], shape: LightShape) -> Scene {
@@ -253,6 +269,30 @@ fn corners_are_close() {
     assert!(measured[0].1 <= 0.03, "{:?}", measured[0]);
 }
 
+/// A light that is brighter in its middle: at an edge, a strip and a corner.
+#[test]
+fn a_light_may_be_brighter_in_its_middle() {
+    let _one = support::serial();
+    let cases = [
+        ("edge", [(5.0, [-30.0, 0.2], ENDLESS)], 0.003 + SAMPLED),
+        ("strip", [(5.0, [-0.25, 0.25], ENDLESS)], 0.02),
+        ("corner", [(5.0, [-30.0, 0.0], [-30.0, 0.0])], 0.04),
+    ];
+    for (name, plates, most) in cases {
+        let images = render(&under(&plates, DISK), &["ssoc:emission=falloff", "ssoc"]);
+        let measured: Vec<_> = images
+            .iter()
+            .map(|i| errors(i, 4, |p| truth_of_falloff(p, &plates)))
+            .collect();
+        println!("{name}: {measured:?}");
+        assert!(measured[0].1 <= most, "{name}: {measured:?}");
+        assert!(
+            measured[1].1 > 0.05,
+            "{name}: the option does nothing: {measured:?}"
+        );
+    }
+}
+
 /// A ball of `rings` rings around `middle`.
 fn ball(middle: Vec3, radius: f32, rings: u32) -> Primitive {
     let sectors = 2 * rings;
@@ -286,17 +326,7 @@ fn a_large_sphere_light_behind_a_ball() {
     let (middle, radius, light) = (Vec3::new(-2.0, 5.0, 0.0), 2.0, 1.35);
     let shape = LightShape::Sphere { radius: light };
     let scene = scene(vec![floor(), ball(middle, radius, 64)], shape);
-    let images = render(
-        &scene,
-        &[
-            "ssoc",
-            "ssoc:lookups=1",
-            "ssoc:lookups=1,bands=128",
-            "ssoc:bands=128",
-            "ssoc:lookups=32",
-        ],
-    );
-    let image = &images[0];
+    let image = &render(&scene, &["ssoc"])[0];
     let center = Vec3::new(0.0, HEIGHT, 0.0);
     // Rays from a point to the disk that it sees of the light.
     let free = |p: Vec3, passes: &dyn Fn(Vec3) -> bool| {
@@ -330,8 +360,6 @@ fn a_large_sphere_light_behind_a_ball() {
     let (rms, worst) = errors(image, 4, seen);
     let (of_outline, _) = errors(image, 4, seen_past_outline);
     println!("ball: rms {rms}, largest {worst}; of its outline: rms {of_outline}");
-    let stairs: Vec<_> = images.iter().map(|i| largest_stair(i, |_| 0.0)).collect();
-    println!("ball: steps {stairs:?}");
     // What is between the ball and its outline is the method's own error: rms 0.0165 here.
     assert!(of_outline <= 0.01, "{of_outline}");
     assert!(rms <= 0.01 + 0.0165, "{rms}");
@@ -363,6 +391,20 @@ fn cracks_are_no_outlines() {
     ];
     let image = &render(&under(&parts, DISK), &["ssoc"])[0];
     let most = image.iter().copied().fold(0.0, f32::max);
+    assert!(most <= 1.0e-3, "{most}");
+}
+
+/// Where a second plate hides what is past the edge of the first, no light gets past that edge.
+#[test]
+fn what_is_beyond_an_edge_may_be_hidden_too() {
+    let _one = support::serial();
+    let all = [
+        (3.0, [-30.0, 0.1], ENDLESS),
+        (5.0, [-9.0, 9.0], [-9.0, 9.0]),
+    ];
+    let image = &render(&under(&all, DISK), &["ssoc"])[0];
+    let most = image.iter().copied().fold(0.0, f32::max);
+    println!("beyond an edge: {most}");
     assert!(most <= 1.0e-3, "{most}");
 }
 

@@ -13,14 +13,34 @@
 #include "common/combine.glsl"
 #include "ssoc/edge.glsl"
 
+// Cells on the inner ring.
+const uint INNER = LOOKUPS > 8u ? (LOOKUPS - 1u) / 3u : LOOKUPS - 1u;
+
+// From where to where of the disk's area, 0 to 1, the ring of a cell reaches.
+vec2 cell_ring(uint cell) {
+    float first = cell == 0u ? 0.0 : cell > INNER ? float(1u + INNER) : 1.0;
+    float last = cell == 0u ? 1.0 : cell > INNER ? float(LOOKUPS) : float(1u + INNER);
+    return vec2(first, last) / float(LOOKUPS);
+}
+
+// Part of the light's power that a cell has.
+float cell_power(uint cell) {
+    vec2 ring = cell_ring(cell);
+    return (FALLOFF != 0u ? 2.0 - ring.x - ring.y : 1.0) / float(LOOKUPS);
+}
+
 // Middle of a cell in the unit disk: the first in its centre, the others on a ring, or on two rings
 // where there are more than eight.
 vec2 cell_middle(uint cell) {
-    const uint INNER = LOOKUPS > 8u ? (LOOKUPS - 1u) / 3u : LOOKUPS - 1u;
     bool outer = cell > INNER;
     float count = float(outer ? LOOKUPS - 1u - INNER : INNER);
-    float before = outer ? float(1u + INNER) : 1.0;
-    float part = (before + 0.5 * count) / float(LOOKUPS);
+    vec2 ring = cell_ring(cell);
+    float part = 0.5 * (ring.x + ring.y);
+    if (FALLOFF != 0u) {
+        // The mean by power.
+        float squares = dot(ring, ring) + ring.x * ring.y;
+        part = (part - squares / 3.0) / max(1.0 - part, 1.0e-6);
+    }
     float turn = 6.2831853 * (float(cell - 1u) + (outer ? 0.5 : 0.0)) / max(count, 1.0);
     return cell == 0u ? vec2(0.0) : sqrt(part) * vec2(cos(turn), sin(turn));
 }
@@ -66,6 +86,19 @@ bool still_blocked(Place here, LightView light_view, vec2 middle, vec2 map, floa
     }
     map = map_of(light_view, passage(here, light_view, middle, depth));
     return rise_of(here, light_view, shown_depth(here, light_view, map)) >= SAME * rise;
+}
+
+// Whether something else hides the part of a cell that an edge leaves, as the bottom of a dent does
+// past the dent's rim. What is much nearer to the receiver may be its own surface, and not where the ray
+// is at that depth.
+bool hidden_beside(Place here, LightView light_view, Seen near) {
+    const float LEAST = 0.25;
+    float texel = max(abs(1.0 / light_view.scale.x), abs(1.0 / light_view.scale.y)) / float(params.counts.y);
+    vec2 map = map_of(light_view, near.nearest + 1.5 * texel * near.outward);
+    return in_map(map)
+        && blocked_at(here, map)
+        && rise_of(here, light_view, shown_depth(here, light_view, map))
+            >= LEAST * rise_of(here, light_view, near.depth);
 }
 
 // near: the nearest edge on the cell's own side; far: that of the other map, the other edge of a
@@ -118,7 +151,8 @@ float soft_cells(Place here, LightView light_view) {
             // Without an outline near, it is as at the receiver's own place, or else as the first
             // edge has it.
             seen = blocked == here.hidden ? hard : cell_past(chord, middle);
-            if (cell > 0u && (near_entry & EDGE_NUMBER) == first && far_entry == 0u && second_entry == 0u) {
+            bool plain = (near_entry & EDGE_NUMBER) == first && far_entry == 0u && second_entry == 0u;
+            if (cell > 0u && plain && (!blocked || cell_past(chord, middle) == 0.0)) {
                 seen = cell_past(chord, middle);
                 break;
             }
@@ -146,6 +180,16 @@ float soft_cells(Place here, LightView light_view) {
                 bool other_side = blocked ? near.delta > 1.5 * texel : near.delta < -1.5 * texel;
                 if (!other_side) {
                     seen = cell_seen(blocked, near, far, middle);
+                    bool asked = blocked && (cell == 0u || seen > 0.0);
+                    if (asked && hidden_beside(here, light_view, near)) {
+                        seen = 0.0;
+                        if (cell == 0u) {
+                            // As without an edge.
+                            first = EDGE_NUMBER;
+                            chord = vec3(-1.0, 1.0, 0.0);
+                            result = 0.0;
+                        }
+                    }
                 }
             }
             if (cell == 0u || near.number == 0u) {
@@ -157,9 +201,9 @@ float soft_cells(Place here, LightView light_view) {
             }
             passed = near.depth;
         }
-        change += seen - cell_past(chord, middle);
+        change += cell_power(cell) * (seen - cell_past(chord, middle));
     }
-    return clamp(result + change / float(LOOKUPS), 0.0, 1.0);
+    return clamp(result + change, 0.0, 1.0);
 }
 
 #endif

@@ -39,12 +39,15 @@ float past_cutouts(Place here, LightView light_view, float turn) {
         return -1.0;
     }
     float seen = 0.0;
+    float all = 0.0;
     for (uint i = 0u; i < CUTOUT_TAPS; ++i) {
-        vec2 at = passage(here, light_view, disk_tap(i, CUTOUT_TAPS, turn), sum / count);
-        vec2 map = map_of(light_view, at);
-        seen += in_map(map) && blocked_at(here, map) ? 0.0 : 1.0;
+        vec2 tap = disk_tap(i, CUTOUT_TAPS, turn);
+        vec2 map = map_of(light_view, passage(here, light_view, tap, sum / count));
+        float power = FALLOFF != 0u ? 1.0 - dot(tap, tap) : 1.0;
+        seen += in_map(map) && blocked_at(here, map) ? 0.0 : power;
+        all += power;
     }
-    return seen / float(CUTOUT_TAPS);
+    return seen / all;
 }
 
 #endif

@@ -181,10 +181,22 @@ Seen look_at(Place here, LightView light_view, uint entry, vec2 from_place) {
     return found;
 }
 
+// The part of the light's power beyond the chord at -offset from its centre, as disk_above.
+float power_above(float offset) {
+    if (FALLOFF == 0u) {
+        return disk_above(offset);
+    }
+    // Brightness 1 - s^2: 1/2 + (x (5 - 2 x^2) sqrt(1 - x^2) / 3 + asin x) / pi, within 1e-6.
+    float t = 0.5 + 0.5 * offset;
+    float m = max(min(t, 1.0 - t), 0.0);
+    float part = m * m * sqrt(m) * (5.4312306 - m * (5.80473339 - m * (1.0640972 + m * 0.26827567)));
+    return t > 0.5 ? 1.0 - part : part;
+}
+
 // The part of the light seen past the edge's line.
 float seen_past(Seen edge) {
     float t = 0.5 + 0.5 * edge.chord.x;
-    return CUBIC != 0u ? t * t * (3.0 - 2.0 * t) : disk_above(edge.chord.x);
+    return CUBIC != 0u ? t * t * (3.0 - 2.0 * t) : power_above(edge.chord.x);
 }
 
 #endif

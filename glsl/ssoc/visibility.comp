@@ -26,6 +26,8 @@ const uint COMBINE_OR = 5u;
 layout(constant_id = 5) const uint CUBIC = 0u;
 // Edges a texel of the distortion maps.
 layout(constant_id = 6) const uint LAYERS = 1u;
+// 1: brightness falls from the middle of the disk to its rim, as 1 - s^2.
+layout(constant_id = 7) const uint FALLOFF = 0u;
 
 layout(set = 0, binding = 0, std140) uniform View {
     ViewParams view;
@@ -110,6 +112,11 @@ float pixel_visibility(uvec2 pixel) {
     vec3 p = view.camera.eye.xyz + depth * pixel_ray(view.camera, pixel);
     bool hit = depth > 0.0;
     float above = light_above(view.light, LIGHT_SHAPE, p, n);
+    if (FALLOFF != 0u && LIGHT_SHAPE != LIGHT_POINT) {
+        vec3 offset = light_offset(view.light, p);
+        vec3 axis = abs(offset.x) < abs(offset.y) ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
+        above = power_above(light_chord(light_disk(view.light, LIGHT_SHAPE, p, axis), n).x);
+    }
     float result = hit ? above : 1.0;
     if (hit && above > 0.0 && params.counts.x > 0u) {
         vec3 q = view.light.center.w > 0.0 ? -light_offset(view.light, p) : p;

@@ -409,6 +409,7 @@ fn add_visibility<'f>(
                 (4, options.combine as u32),
                 (5, u32::from(options.cubic)),
                 (6, options.layers),
+                (7, u32::from(options.falloff)),
             ],
             ..ComputePipelineDesc::new(&spirv::SSOC_VISIBILITY_COMP)
         };

@@ -45,6 +45,9 @@ pub struct SsocOptions {
     pub lookups: u32,
     /// How several edges join.
     pub combine: Combine,
+    /// Brightness falls from the middle of the light to its rim as 1 - s^2, of a sphere as seen from
+    /// the receiver, instead of being even; not with `cubic`.
+    pub falloff: bool,
     /// `3 t^2 - 2 t^3` of the hidden part of the diameter, as published, instead of the light's area.
     pub cubic: bool,
 }
@@ -57,6 +60,7 @@ impl SsocOptions {
         layers: 1,
         lookups: 13,
         combine: Combine::Cells,
+        falloff: false,
         cubic: false,
     };
 
@@ -98,6 +102,12 @@ impl SsocOptions {
             "exact or cubic (3 t^2 - 2 t^3, as published)",
             "part of the light beyond an edge",
         ),
+        TechniqueOption::new(
+            "emission",
+            "even",
+            "even or falloff (1 - s^2 at a part s of the way from the light's middle to its rim; with area=exact)",
+            "brightness of the light's parts",
+        ),
     ];
 
     /// The values, in the order of [`ALL`](Self::ALL).
@@ -110,6 +120,7 @@ impl SsocOptions {
             self.lookups.to_string(),
             combine.map_or("", |(name, _)| name).to_string(),
             if self.cubic { "cubic" } else { "exact" }.to_string(),
+            if self.falloff { "falloff" } else { "even" }.to_string(),
         ]
     }
 
@@ -128,6 +139,13 @@ impl SsocOptions {
                 self.cubic = match value {
                     "exact" => false,
                     "cubic" => true,
+                    _ => return None,
+                }
+            }
+            "emission" => {
+                self.falloff = match value {
+                    "even" => false,
+                    "falloff" => true,
                     _ => return None,
                 }
             }

@@ -287,11 +287,15 @@ fn bodies_and_sheets_are_told_apart() {
         let sheet = plate("sheet", ENDLESS, z, 5.0);
         let blockers = triangles(&[bar.clone(), sheet.clone()]);
         let scene = scene(vec![floor(), bar, sheet], DISK);
-        let found = all_errors(&scene, &["dbuffer"], |p, way| {
-            meets_triangles(&blockers, p, way)
+        let image = &render(&scene, &["dbuffer"])[0];
+        let (light, places) = (scene.lights[0].light, places(DISK, 5_000));
+        let found = errors(image, 3, |p| {
+            truth(p, &light, &places, |p, way| {
+                meets_triangles(&blockers, p, way)
+            })
         });
         println!("{what}: {found:?}");
-        assert!(found[0].0 <= limit, "{what}: {found:?}");
+        assert!(found.0 <= limit, "{what}: {found:?}");
     }
 }
 
@@ -567,6 +571,12 @@ fn nothing_jumps_where_the_hard_shadow_of_a_cube_ends() {
     println!("jumps: {most:?}");
     assert!(most[0] > 0.5, "{most:?}");
     assert!(most[1] <= 0.01 + SAMPLED, "{most:?}");
+    // Buffers know one edge, or join a few by two.
+    let limits = [0.04, 0.09, 0.04];
+    assert!(
+        most[2..].iter().zip(limits).all(|(m, limit)| *m <= limit),
+        "{most:?}"
+    );
 }
 
 /// Figures 1 and 7 of the paper: seen from its centre the light's silhouettes are those of the upper
@@ -607,6 +617,64 @@ fn boundaries_are_right_where_the_centre_misleads() {
                 all.len()
             );
         }
+    }
+}
+
+/// Many small plates side by side, as one mesh: so many across and down, metres from one to the next, and of them the
+/// part that is no gap.
+fn many_plates(across: u32, pitch: f32, part: f32) -> Primitive {
+    let at = |i: u32| (i as f32 - 0.5 * across as f32) * pitch;
+    let plates = (0..across * across).map(|i| {
+        let [x, z] = [at(i % across), at(i / across)];
+        let end = part * pitch;
+        plate("plates", [x, x + end], [z, z + end], 5.0)
+    });
+    let mut all = Primitive {
+        name: "plates".to_string(),
+        ..Primitive::default()
+    };
+    for one in plates {
+        let first = all.positions.len() as u32;
+        all.indices.extend(one.indices.iter().map(|i| first + i));
+        all.positions.extend(one.positions);
+        all.normals.extend(one.normals);
+    }
+    all
+}
+
+/// Forty thousand silhouettes from end to end: with a light as large as a few plates lists and edges do for
+/// them, still exactly; with a large one there are thousands before each receiver, and rays decide.
+#[test]
+fn tens_of_thousands_of_edges_are_no_exception() {
+    let _one = support::serial();
+    const ACROSS: u32 = 100;
+    let (pitch, part) = (0.03, 0.6);
+    let plates = many_plates(ACROSS, pitch, part);
+    let blocks = |p: Vec3, way: Vec3| {
+        let at = (p + way * ((HEIGHT - 5.0 - p.y) / way.y)) / pitch + 0.5 * ACROSS as f32;
+        let within = |x: f32| (0.0..ACROSS as f32).contains(&x) && x.fract() < part;
+        within(at.x) && within(at.z)
+    };
+    for (radius, limit) in [(0.1, 0.002 + SAMPLED), (1.0, 0.08)] {
+        let shape = LightShape::Disk { radius };
+        let scene = scene(vec![floor(), plates.clone()], shape);
+        let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
+        let request = FrameRequest {
+            camera: camera(),
+            size: [SIZE; 2],
+            lights: vec![0],
+            technique: "dbuffer".parse().unwrap(),
+        };
+        let frame = renderer.render(&request).unwrap();
+        support::assert_no_messages(&renderer.destroy().unwrap());
+        // Four around each plate, and one across.
+        assert_eq!(frame.counters["edges"], 5 * u64::from(ACROSS * ACROSS) + 5);
+        let (light, places) = (scene.lights[0].light, places(shape, 10_000));
+        let found = errors(&frame.lights[0].visibility, 3, |p| {
+            truth(p, &light, &places, blocks)
+        });
+        println!("plates under {radius}: {found:?}");
+        assert!(found.0 <= limit, "{found:?}");
     }
 }
 

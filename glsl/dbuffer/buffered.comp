@@ -93,6 +93,7 @@ struct Crossing {
     vec2 nearest;  // point of the edge's image on the unit disk nearest to its centre
     vec2 open;     // unit vector across the edge, towards what is seen
     uint blocker;
+    bool is_weak;  // hides nothing beside another edge of the blocker
 };
 
 // As published. distance: of the receiver from the light's centre, of a sun the depth from where stored
@@ -100,7 +101,7 @@ struct Crossing {
 Crossing crossing_at_distances(uvec2 stored, bool umbra, float distance) {
     float surface = uintBitsToFloat(stored.x);
     float silhouette = surface * float(stored.y >> 16) / MOST_PART;
-    Crossing found = Crossing(distance > silhouette, 0.0, vec2(0.0), vec2(0.0), stored.y & 0xffffu);
+    Crossing found = Crossing(distance > silhouette, 0.0, vec2(0.0), vec2(0.0), stored.y & 0xffffu, false);
     float part = LIGHT_SHAPE == LIGHT_SUN
         ? (distance - surface) / (2.0 * (distance - silhouette))
         : silhouette * (distance - surface) / (2.0 * surface * (distance - silhouette));
@@ -109,13 +110,15 @@ Crossing crossing_at_distances(uvec2 stored, bool umbra, float distance) {
 }
 
 Crossing crossing_at_edge(CoverageReceiver r, uvec2 stored, bool umbra) {
-    Crossing found = Crossing(true, 0.5, vec2(0.0), vec2(0.0), stored.y);
+    Crossing found = Crossing(true, 0.5, vec2(0.0), vec2(0.0), stored.y, false);
     if (stored.x == NO_EDGE) {
         return found;
     }
     uvec4 edge = fetch_edge(stored.x - 1u);
-    vec3 a = fetch_point(edge.x).xyz - r.p;
-    vec3 b = fetch_point(edge.y).xyz - r.p;
+    vec3 world_a = fetch_point(edge.x).xyz;
+    vec3 world_b = fetch_point(edge.y).xyz;
+    vec3 a = world_a - r.p;
+    vec3 b = world_b - r.p;
     vec3 on_a = on_light(r, a);
     vec3 on_b = on_light(r, b);
     vec2 range = vec2(0.0, 1.0);
@@ -136,6 +139,10 @@ Crossing crossing_at_edge(CoverageReceiver r, uvec2 stored, bool umbra) {
     float square = dot(along, along);
     float part = square > 0.0 ? clamp(-dot(from, along) / square, 0.0, 1.0) : 0.0;
     found.nearest = from + part * along;
+    // Seen from here the edge is no outline; or its volume is closed around its end, where the light's centre is
+    // free, for receivers off a corner.
+    bool at_end = !umbra && (part <= 0.0 || part >= 1.0);
+    found.is_weak = at_end || faces_on_one_side(r, edge, world_a, world_b) == 0.0;
     float off = length(found.nearest);
     vec2 way = off > 0.0 ? found.nearest / off : vec2(-along.y, along.x) * inversesqrt(max(square, 1.0e-30));
     found.open = umbra ? way : -way;
@@ -209,24 +216,26 @@ float pixel_visibility(uvec2 pixel) {
 
     Crossing kept[8]; // of both kinds
     uint count = 0u;
-    for (uint layer = 0u; layer < push.layers; ++layer) {
-        uvec2 stored = fetch_surface(layer, umbra, place);
+    // What hides nothing beside others counts only where there are none, after all have been looked at.
+    bool weak_last = push.edges != 0u && push.darkest == 0u;
+    for (uint turn = 0u; turn < 2u * push.layers; ++turn) {
+        bool weak = turn >= push.layers;
+        uvec2 stored = fetch_surface(turn % push.layers, umbra, place);
         if (stored.x == 0u) {
-            break;
+            continue;
         }
         Crossing found = push.edges != 0u
             ? crossing_at_edge(r, stored, umbra)
             : crossing_at_distances(stored, umbra, distance);
         float seen = curve_of(found.t);
         bool known = false;
-        for (uint i = 0u; i < count; ++i) {
-            known = known || kept[i].blocker == found.blocker;
-        }
         bool side = false;
         for (uint i = 0u; i < count; ++i) {
+            known = known || kept[i].blocker == found.blocker;
             side = side || is_same_side(kept[i], found);
         }
-        if (!found.between || (push.darkest != 0u && known) || (push.edges != 0u && push.darkest == 0u && side)) {
+        bool again = push.darkest != 0u || weak ? known : push.edges != 0u && side;
+        if (!found.between || again || (weak_last && found.is_weak) != weak) {
             continue;
         }
         if (count == 0u) {
@@ -255,7 +264,7 @@ float pixel_visibility(uvec2 pixel) {
         for (uint i = own; i < count; ++i) {
             side = side || is_same_side(kept[i], found);
         }
-        if (found.between && matters && !side) {
+        if (found.between && matters && !side && !found.is_weak) {
             result = joined(result, kept[0], seen, found);
             kept[count] = found;
             count += 1u;

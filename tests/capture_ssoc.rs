@@ -102,7 +102,7 @@ fn largest_stair(image: &[f32], truth: impl Fn(Vec3) -> f32) -> f32 {
     stairs.fold(0.0, f32::max)
 }
 
-/// A long inclined edge, in one piece and in many, shows no stairs however coarse the maps: texels say
+/// A long inclined edge of many pieces shows no stairs however coarse the maps: texels say
 /// which edge counts, and not how far away it is.
 #[test]
 fn an_inclined_edge_shows_no_stairs() {
@@ -117,27 +117,21 @@ fn an_inclined_edge_shows_no_stairs() {
         let line = (-across.dot(p) * part / (1.0 - part)).clamp(-1.0, 1.0);
         (line.acos() - line * (1.0 - line * line).sqrt()) / std::f32::consts::PI
     };
-    for pieces in [1, 200] {
-        let at = |i: i32, far: f32| {
-            let along = along * (20.0 * (2.0 * i as f32 / pieces as f32 - 1.0));
-            Vec3::new(0.0, HEIGHT - depth, 0.0) + along - across * far
-        };
-        let plates = (0..pieces).map(|i| {
-            let corners = [at(i, 0.0), at(i + 1, 0.0), at(i + 1, 30.0), at(i, 30.0)];
-            quad("piece", corners)
-        });
-        let all = std::iter::once(floor()).chain(plates).collect();
-        let techniques = [
-            "ssoc",
-            "ssoc:bands=64",
-            "ssoc:lookups=1,bands=64",
-            "ssoc:combine=product,lookups=1,bands=64",
-        ];
-        let images = render(&scene(all, DISK), &techniques);
-        let stairs: Vec<_> = images.iter().map(|i| largest_stair(i, truth)).collect();
-        println!("{pieces} pieces: stairs {stairs:?}");
-        assert!(stairs.iter().all(|s| *s <= 0.002), "{pieces}: {stairs:?}");
-    }
+    const PIECES: i32 = 200;
+    let at = |i: i32, far: f32| {
+        let along = along * (20.0 * (2.0 * i as f32 / PIECES as f32 - 1.0));
+        Vec3::new(0.0, HEIGHT - depth, 0.0) + along - across * far
+    };
+    let plates = (0..PIECES).map(|i| {
+        let corners = [at(i, 0.0), at(i + 1, 0.0), at(i + 1, 30.0), at(i, 30.0)];
+        quad("piece", corners)
+    });
+    let all = std::iter::once(floor()).chain(plates).collect();
+    let techniques = ["ssoc", "ssoc:bands=64", "ssoc:lookups=1,bands=64"];
+    let images = render(&scene(all, DISK), &techniques);
+    let stairs: Vec<_> = images.iter().map(|i| largest_stair(i, truth)).collect();
+    println!("stairs {stairs:?}");
+    assert!(stairs.iter().all(|s| *s <= 0.002), "{stairs:?}");
 }
 
 /// What 20,000 samples of a disk are off by at an edge.
@@ -269,28 +263,24 @@ fn corners_are_close() {
     assert!(measured[0].1 <= 0.03, "{:?}", measured[0]);
 }
 
-/// A light that is brighter in its middle: at an edge, a strip and a corner.
+/// A light that is brighter in its middle: both sides of a strip, and a corner.
 #[test]
 fn a_light_may_be_brighter_in_its_middle() {
     let _one = support::serial();
-    let cases = [
-        ("edge", [(5.0, [-30.0, 0.2], ENDLESS)], 0.003 + SAMPLED),
-        ("strip", [(5.0, [-0.25, 0.25], ENDLESS)], 0.02),
-        ("corner", [(5.0, [-30.0, 0.0], [-30.0, 0.0])], 0.04),
-    ];
-    for (name, plates, most) in cases {
-        let images = render(&under(&plates, DISK), &["ssoc:emission=falloff", "ssoc"]);
-        let measured: Vec<_> = images
-            .iter()
-            .map(|i| errors(i, 4, |p| truth_of_falloff(p, &plates)))
-            .collect();
-        println!("{name}: {measured:?}");
-        assert!(measured[0].1 <= most, "{name}: {measured:?}");
-        assert!(
-            measured[1].1 > 0.05,
-            "{name}: the option does nothing: {measured:?}"
-        );
-    }
+    let strip = [(5.0, [-0.25, 0.25], ENDLESS)];
+    let corner = [(5.0, [-30.0, 0.0], [-30.0, 0.0])];
+    let images = render(&under(&strip, DISK), &["ssoc:emission=falloff", "ssoc"]);
+    let measured: Vec<_> = images
+        .iter()
+        .map(|i| errors(i, 4, |p| truth_of_falloff(p, &strip)))
+        .collect();
+    println!("strip: {measured:?}");
+    assert!(measured[0].1 <= 0.02, "{measured:?}");
+    assert!(measured[1].1 > 0.1, "the option does nothing: {measured:?}");
+    let image = &render(&under(&corner, DISK), &["ssoc:emission=falloff"])[0];
+    let (rms, worst) = errors(image, 4, |p| truth_of_falloff(p, &corner));
+    println!("corner: rms {rms}, largest {worst}");
+    assert!(worst <= 0.04, "{worst}");
 }
 
 /// A ball of `rings` rings around `middle`.

@@ -3,7 +3,7 @@
 
 mod support;
 
-use antumbra::capture::{FrameRenderer, FrameRequest};
+use antumbra::capture::{CapturedFrame, FrameRequest};
 use antumbra::light::{AreaLight, LightShape};
 use antumbra::scene::{AlphaMode, Material, Primitive, Scene, SceneCamera};
 use glam::Vec3;
@@ -658,15 +658,14 @@ fn tens_of_thousands_of_edges_are_no_exception() {
     for (radius, limit) in [(0.1, 0.002 + SAMPLED), (1.0, 0.08)] {
         let shape = LightShape::Disk { radius };
         let scene = scene(vec![floor(), plates.clone()], shape);
-        let mut renderer = FrameRenderer::new(support::gpu(), &scene).unwrap();
         let request = FrameRequest {
             camera: camera(),
             size: [SIZE; 2],
             lights: vec![0],
             technique: "dbuffer".parse().unwrap(),
         };
-        let frame = renderer.render(&request).unwrap();
-        support::assert_no_messages(&renderer.destroy().unwrap());
+        let frame =
+            support::rig::with_renderer(&scene, |renderer| renderer.render(&request).unwrap());
         // Four around each plate, and one across.
         assert_eq!(frame.counters["edges"], 5 * u64::from(ACROSS * ACROSS) + 5);
         let (light, places) = (scene.lights[0].light, places(shape, 10_000));
@@ -711,45 +710,39 @@ fn silhouettes_are_kept_while_light_and_caster_stand_still() {
         height: 1.0,
     };
     let still = under(&plates, square);
-    let mut renderer = FrameRenderer::owning(support::gpu(), still.clone()).unwrap();
-    let searches = |names: &[String]| names.iter().filter(|n| n.contains("silhouettes.")).count();
-    for technique in ["dbuffer", "dbuffer:light=disk", EDGES] {
-        let mut request = FrameRequest {
-            camera: camera(),
-            size: [SIZE; 2],
-            lights: vec![0],
-            technique: technique.parse().unwrap(),
-        };
-        let first = renderer.render_static(&request).unwrap();
-        assert_eq!(searches(&first.report.passes), 3, "{technique}");
-        request.camera.position.x += 0.1;
-        let moved = renderer.render_static(&request).unwrap();
-        assert_eq!(searches(&moved.report.passes), 0, "{technique}");
-        let kept = ["masks_kept", "silhouettes_kept"].map(|name| moved.counters[name]);
-        assert_eq!(kept, [0, 1], "{technique}");
-        let anew = renderer.render(&request).unwrap();
-        assert_eq!(searches(&anew.report.passes), 3, "{technique}");
-        assert!(
-            moved.lights[0].visibility == anew.lights[0].visibility,
-            "{technique}"
-        );
-        assert!(
-            moved.lights[0].visibility != first.lights[0].visibility,
-            "{technique}"
-        );
-    }
-    let mut other = still;
-    other.lights[0].light.center.x += 0.3;
-    renderer.set_scene(other).unwrap();
-    let request = FrameRequest {
+    let request = |technique: &str| FrameRequest {
         camera: camera(),
         size: [SIZE; 2],
         lights: vec![0],
-        technique: EDGES.parse().unwrap(),
+        technique: technique.parse().unwrap(),
     };
-    let elsewhere = renderer.render_static(&request).unwrap();
-    assert_eq!(searches(&elsewhere.report.passes), 3);
-    support::assert_no_messages(&renderer.destroy().unwrap());
+    let searches = |frame: &CapturedFrame| {
+        let passes = frame.report.passes.iter();
+        passes.filter(|n| n.contains("silhouettes.")).count()
+    };
+    support::rig::with_renderer(&still, |renderer| {
+        for technique in ["dbuffer", "dbuffer:light=disk", EDGES] {
+            let mut request = request(technique);
+            let first = renderer.render_static(&request).unwrap();
+            assert_eq!(searches(&first), 3, "{technique}");
+            request.camera.position.x += 0.1;
+            let moved = renderer.render_static(&request).unwrap();
+            assert_eq!(searches(&moved), 0, "{technique}");
+            let kept = ["masks_kept", "silhouettes_kept"].map(|name| moved.counters[name]);
+            assert_eq!(kept, [0, 1], "{technique}");
+            let anew = renderer.render(&request).unwrap();
+            assert_eq!(searches(&anew), 3, "{technique}");
+            let [first, moved, anew] =
+                [first, moved, anew].map(|mut f| f.lights.remove(0).visibility);
+            assert!(moved == anew && moved != first, "{technique}");
+        }
+    });
+    let mut other = still;
+    other.lights[0].light.center.x += 0.3;
+    support::rig::with_renderer(&other, |renderer| {
+        let elsewhere = renderer.render_static(&request(EDGES)).unwrap();
+        assert_eq!(searches(&elsewhere), 3);
+    });
 }
 
 #[test]

@@ -220,6 +220,21 @@ Reach larger(Reach one, Reach other) {
     return Reach(max(one.within, other.within), max(one.before, other.before));
 }
 
+// Whether anything in a box may hide any of the light: the largest of each function over it.
+bool box_may_matter(CoverageReceiver r, vec3 low, vec3 high) {
+    vec3 middle = 0.5 * (low + high) - r.p;
+    vec3 half_size = 0.5 * (high - low) + r.rounding_m;
+    vec3 u = abs(r.row_w + r.row_u);
+    vec3 minus_u = abs(r.row_w - r.row_u);
+    vec3 v = abs(r.row_w + r.row_v);
+    vec3 minus_v = abs(r.row_w - r.row_v);
+    float w = dot(abs(r.row_w), half_size);
+    Reach most = reach_of(r, middle);
+    most.within += vec4(dot(u, half_size), dot(minus_u, half_size), dot(v, half_size), dot(minus_v, half_size));
+    most.before += vec3(LIGHT_SHAPE == LIGHT_SUN ? 0.0 : w, w, dot(abs(r.n), half_size));
+    return may_matter(most);
+}
+
 // Whether an edge may hide any of the light; ends from the receiver. Much less to do than add_edge.
 bool edge_may_matter(CoverageReceiver r, vec3 a, vec3 b) {
     vec3 line = cross(on_light(r, a), on_light(r, b));

@@ -25,6 +25,7 @@ layout(set = 0, binding = 6, std430) buffer Pool {
 };
 layout(set = 0, binding = 7, r32ui) uniform writeonly uimage2D pool;
 layout(set = 0, binding = 8, rgba32ui) uniform writeonly uimage2D lists;
+layout(set = 0, binding = 9, rgba32f) uniform writeonly image2D chunk_boxes;
 
 // A software driver may end loops after 65,535 turns of all lanes of a vector together: a walk ends
 // itself before, and the visibility takes it up where it ended.
@@ -69,21 +70,29 @@ void main() {
     uint resume = nodes;
     uint chunk = 0u;
     uint slot = CHUNK;
+    vec3 low = vec3(1.0e38);
+    vec3 high = vec3(-1.0e38);
     uint node = 0u;
     uint steps = 0u;
     while (node < resume) {
         steps += 1u;
-        vec4 low = fetch_node_low(node);
+        vec4 node_low = fetch_node_low(node);
         uint next = node + 1u;
-        if (low.w < 0.0) {
-            next = shaft_meets_box(shaft, low.xyz, fetch_node_high(node).xyz) ? next : uint(-low.w);
-        } else if (material_is_masked(fetch_triangle_texel(4u * uint(low.w) + 3u).w)) {
-            uint triangle = uint(low.w);
+        if (node_low.w < 0.0) {
+            next = shaft_meets_box(shaft, node_low.xyz, fetch_node_high(node).xyz) ? next : uint(-node_low.w);
+        } else if (material_is_masked(fetch_triangle_texel(4u * uint(node_low.w) + 3u).w)) {
+            uint triangle = uint(node_low.w);
             vec3 a = fetch_triangle_texel(4u * triangle).xyz;
             vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
             vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
             if (shaft_meets_triangle(shaft, a, b, c)) {
                 if (slot == CHUNK) {
+                    if (count > 0u) {
+                        imageStore(chunk_boxes, triangle_texel_place(2u * chunk), vec4(low, 0.0));
+                        imageStore(chunk_boxes, triangle_texel_place(2u * chunk + 1u), vec4(high, 0.0));
+                    }
+                    low = vec3(1.0e38);
+                    high = vec3(-1.0e38);
                     uint fresh = atomicAdd(chunks_used, 1u);
                     if (fresh >= params.counts.w) {
                         resume = node;
@@ -97,6 +106,8 @@ void main() {
                 }
                 if (resume == nodes) {
                     imageStore(pool, chunk_entry_place(chunk, slot), uvec4(triangle));
+                    low = min(low, min(a, min(b, c)));
+                    high = max(high, max(a, max(b, c)));
                     slot += 1u;
                     count += 1u;
                 }
@@ -104,6 +115,10 @@ void main() {
         }
         node = next;
         resume = steps == MOST_STEPS ? min(resume, node) : resume;
+    }
+    if (count > 0u && chunk < params.counts.w) {
+        imageStore(chunk_boxes, triangle_texel_place(2u * chunk), vec4(low, 0.0));
+        imageStore(chunk_boxes, triangle_texel_place(2u * chunk + 1u), vec4(high, 0.0));
     }
     // After the lists of silhouettes.
     ivec2 place = list_place(params.sizes.x, tile, tiles.x * tiles.y);

@@ -29,6 +29,7 @@ layout(set = 0, binding = 9, std430) buffer Pool {
 };
 layout(set = 0, binding = 10, r32ui) uniform writeonly uimage2D pool;
 layout(set = 0, binding = 11, rgba32ui) uniform writeonly uimage2D lists;
+layout(set = 0, binding = 12, rgba32f) uniform writeonly image2D chunk_boxes;
 
 vec4 fetch_triangle_texel(uint texel) {
     return vec4(0.0); // none is needed here
@@ -65,6 +66,8 @@ void main() {
     uint resume = end;
     uint chunk = 0u;
     uint slot = CHUNK;
+    vec3 low = vec3(1.0e38);
+    vec3 high = vec3(-1.0e38);
     while (at < end) {
         uint step = 1u;
         if (at % BLOCK == 0u && !meets(shaft, block_boxes, at / BLOCK)) {
@@ -78,6 +81,12 @@ void main() {
             vec3 b = texelFetch(ends, triangle_texel_place(2u * at + 1u), 0).xyz;
             if (shaft_meets_triangle(shaft, a, b, b)) {
                 if (slot == CHUNK) {
+                    if (count > 0u) {
+                        imageStore(chunk_boxes, triangle_texel_place(2u * chunk), vec4(low, 0.0));
+                        imageStore(chunk_boxes, triangle_texel_place(2u * chunk + 1u), vec4(high, 0.0));
+                    }
+                    low = vec3(1.0e38);
+                    high = vec3(-1.0e38);
                     uint fresh = atomicAdd(chunks_used, 1u);
                     if (fresh >= params.counts.w) {
                         resume = at;
@@ -92,12 +101,18 @@ void main() {
                 }
                 if (step == 1u) {
                     imageStore(pool, chunk_entry_place(chunk, slot), uvec4(at));
+                    low = min(low, min(a, b));
+                    high = max(high, max(a, b));
                     slot += 1u;
                     count += 1u;
                 }
             }
         }
         at += step;
+    }
+    if (count > 0u && chunk < params.counts.w) {
+        imageStore(chunk_boxes, triangle_texel_place(2u * chunk), vec4(low, 0.0));
+        imageStore(chunk_boxes, triangle_texel_place(2u * chunk + 1u), vec4(high, 0.0));
     }
     imageStore(lists, list_place(block, tile, tiles.x * tiles.y), uvec4(first_chunk, count, resume, end));
 }

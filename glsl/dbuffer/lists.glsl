@@ -17,6 +17,8 @@ const uint GROUP = 16u;
 const uint LARGE_GROUP = 256u;
 const uint BLOCK = 4096u;
 
+// Each chunk has a box around what it lists: texels 2 i and 2 i + 1 of an image of their own for chunk i.
+
 // Entries of a chunk; the one after them is the number of the list's next chunk.
 const uint CHUNK = 31u;
 

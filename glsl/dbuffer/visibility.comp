@@ -38,6 +38,7 @@ layout(set = 0, binding = 18, std140) uniform ThroughBlock {
     Through through;
 };
 layout(set = 0, binding = 19) uniform sampler2D ends;
+layout(set = 0, binding = 20) uniform sampler2D chunk_boxes;
 
 #include "dbuffer/coverage.glsl"
 #include "dbuffer/cutouts.glsl"
@@ -110,34 +111,59 @@ bool has_entries(Entries entries) {
     return entries.rest > 0u || entries.missing < entries.end;
 }
 
-// False where the list only went on to its next chunk.
-bool next_entry(inout Entries entries, out uint entry) {
+// Goes on to the next chunk whose box may matter; false at the end of the list. What the list does not know is a
+// chunk without a box.
+bool next_chunk(CoverageReceiver r, inout Entries entries) {
+    bool found = false;
+    while (!found && has_entries(entries)) {
+        bool listed = entries.rest > 0u;
+        if (listed && entries.slot == CHUNK) {
+            entries.chunk = texelFetch(pool, chunk_entry_place(entries.chunk, CHUNK), 0).x;
+            entries.slot = 0u;
+        }
+        vec3 low = texelFetch(chunk_boxes, triangle_texel_place(2u * entries.chunk), 0).xyz;
+        vec3 high = texelFetch(chunk_boxes, triangle_texel_place(2u * entries.chunk + 1u), 0).xyz;
+        found = !listed || box_may_matter(r, low, high);
+        if (!found) {
+            entries.rest -= min(entries.rest, CHUNK);
+            entries.slot = CHUNK;
+        }
+    }
+    return found;
+}
+
+// The next place in the chunk, and whether there are more in it.
+uint next_entry(inout Entries entries, out bool has_more) {
     bool listed = entries.rest > 0u;
-    uint stored = texelFetch(pool, chunk_entry_place(entries.chunk, entries.slot), 0).x;
-    bool is_link = listed && entries.slot == CHUNK;
-    entry = listed ? stored : entries.missing;
-    entries.chunk = is_link ? stored : entries.chunk;
-    entries.slot = is_link ? 0u : entries.slot + 1u;
-    entries.rest -= listed && !is_link ? 1u : 0u;
+    uint entry = listed
+        ? texelFetch(pool, chunk_entry_place(entries.chunk, entries.slot), 0).x
+        : entries.missing;
+    entries.slot += 1u;
+    entries.rest -= listed ? 1u : 0u;
     entries.missing += listed ? 0u : 1u;
-    return !is_link;
+    has_more = listed ? entries.slot < CHUNK && entries.rest > 0u : entries.missing < entries.end;
+    return entry;
 }
 
 // All of a tile's edges. Vector units walk through branches that none of their lanes takes: so each lane looks
-// for the next edge that matters to it in a loop of its own, and only then do all go through the rest. (A loop that
-// tests its condition at its end loses the values of lanes that leave it early on Mesa 22.3.)
+// for the next chunk and in it for the next edge that matters to it in loops of its own, and only then do all
+// go through the rest. (A loop that tests its condition at its end loses the values of lanes that leave it early
+// on Mesa 22.3.)
 void add_edges(uint tile, uint tiles, CoverageReceiver r, inout Coverage found) {
     for (uint block = 0u; block < params.sizes.x; ++block) {
         Entries entries = list_entries(block, tile, tiles);
-        while (has_entries(entries)) {
+        bool in_chunk = false;
+        while (in_chunk || has_entries(entries)) {
+            if (!in_chunk) {
+                in_chunk = next_chunk(r, entries);
+            }
             bool matters = false;
             uint entry = 0u;
-            while (!matters && has_entries(entries)) {
-                if (next_entry(entries, entry)) {
-                    vec3 a = texelFetch(ends, triangle_texel_place(2u * entry), 0).xyz;
-                    vec3 b = texelFetch(ends, triangle_texel_place(2u * entry + 1u), 0).xyz;
-                    matters = edge_may_matter(r, a - r.p, b - r.p);
-                }
+            while (in_chunk && !matters) {
+                entry = next_entry(entries, in_chunk);
+                vec3 a = texelFetch(ends, triangle_texel_place(2u * entry), 0).xyz;
+                vec3 b = texelFetch(ends, triangle_texel_place(2u * entry + 1u), 0).xyz;
+                matters = edge_may_matter(r, a - r.p, b - r.p);
             }
             if (matters) {
                 add_edge(r, texelFetch(numbers, triangle_texel_place(entry), 0).x, found);
@@ -162,20 +188,23 @@ uint cutouts_of(uint tile, uint tiles) {
     return stored.y + stored.w - stored.z;
 }
 
-// All of a tile's triangles with holes, in two loops like edges.
+// All of a tile's triangles with holes, in loops like edges.
 void add_cutouts(uint tile, uint tiles, CoverageReceiver r, inout uvec2 seen) {
     Entries entries = list_entries(params.sizes.x, tile, tiles);
-    while (has_entries(entries) && (seen.x | seen.y) != 0u) {
+    bool in_chunk = false;
+    while ((in_chunk || has_entries(entries)) && (seen.x | seen.y) != 0u) {
+        if (!in_chunk) {
+            in_chunk = next_chunk(r, entries);
+        }
         bool matters = false;
         uint triangle = 0u;
-        while (!matters && has_entries(entries)) {
+        while (in_chunk && !matters) {
             bool listed = entries.rest > 0u;
-            if (next_entry(entries, triangle)) {
-                // What the list does not know are nodes.
-                float leaf = listed ? float(triangle) : fetch_node_low(triangle).w;
-                triangle = uint(max(leaf, 0.0));
-                matters = leaf >= 0.0 && cutout_may_matter(r, triangle);
-            }
+            uint entry = next_entry(entries, in_chunk);
+            // What the list does not know are nodes.
+            float leaf = listed ? float(entry) : fetch_node_low(entry).w;
+            triangle = uint(max(leaf, 0.0));
+            matters = leaf >= 0.0 && cutout_may_matter(r, triangle);
         }
         if (matters) {
             add_cutout(r, triangle, seen);

@@ -66,6 +66,7 @@ pub(super) struct Lists {
 struct Made {
     used: BufferId,
     pool: ImageId,
+    chunk_boxes: ImageId,
     lists: ImageId,
 }
 
@@ -74,6 +75,8 @@ struct Made {
 pub(super) struct Found {
     /// R32_UINT: chunks of places in the list of silhouettes, and of numbers of triangles.
     pub pool: ImageId,
+    /// RGBA32F: boxes around what chunks list, scene space, metres.
+    pub chunk_boxes: ImageId,
     /// RGBA32_UINT: `list_place` in `dbuffer/lists.glsl`.
     pub lists: ImageId,
     /// RGBA32F: both ends of each silhouette, scene space, metres.
@@ -108,8 +111,7 @@ impl Lists {
         if inputs.scene.has_masks() {
             made = self.add_cutouts(graph, inputs, made);
         }
-        let Made { pool, lists, .. } = made;
-        self.add_settle(graph, inputs, [pool, lists, ends])
+        self.add_settle(graph, inputs, &made, ends)
     }
 
     fn add_boxes(
@@ -182,6 +184,8 @@ impl Lists {
 
         let pool = texels(vk::Format::R32_UINT, self.sizes.chunks * CHUNK_TEXELS);
         let pool = graph.create_image(format!("{NAME}.pool {name}"), pool);
+        let boxed = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * self.sizes.chunks);
+        let chunk_boxes = graph.create_image(format!("{NAME}.chunk_boxes {name}"), boxed);
         let blocks = self.sizes.blocks;
         let desc = texels(
             vk::Format::R32G32B32A32_UINT,
@@ -200,6 +204,7 @@ impl Lists {
         let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
         let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
         let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
+        let chunk_boxes = pass.overwrite(chunk_boxes, Access::StorageWrite(Stage::Compute));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -215,6 +220,7 @@ impl Lists {
                 Bind::storage_buffer(9, used),
                 Bind::storage_image(10, pool),
                 Bind::storage_image(11, lists),
+                Bind::storage_image(12, chunk_boxes),
             ];
             let shader = &spirv::DBUFFER_LISTS_COMP;
             ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
@@ -222,7 +228,12 @@ impl Lists {
             ctx.dispatch([groups, blocks, 1]);
             Ok(())
         });
-        Made { used, pool, lists }
+        Made {
+            used,
+            pool,
+            chunk_boxes,
+            lists,
+        }
     }
 
     fn add_cutouts(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, made: Made) -> Made {
@@ -239,6 +250,7 @@ impl Lists {
         let used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
         let pool = pass.write(made.pool, Access::StorageWrite(Stage::Compute));
         let lists = pass.write(made.lists, Access::StorageWrite(Stage::Compute));
+        let chunk_boxes = pass.write(made.chunk_boxes, Access::StorageWrite(Stage::Compute));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -251,24 +263,37 @@ impl Lists {
                 Bind::storage_buffer(6, used),
                 Bind::storage_image(7, pool),
                 Bind::storage_image(8, lists),
+                Bind::storage_image(9, chunk_boxes),
             ];
             let shader = &spirv::DBUFFER_CUTOUTS_COMP;
             ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
             ctx.dispatch(shader.groups([across * down, 1, 1]));
             Ok(())
         });
-        Made { used, pool, lists }
+        Made {
+            used,
+            pool,
+            chunk_boxes,
+            lists,
+        }
     }
 
     fn add_settle(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        [pool, lists, ends]: [ImageId; 3],
+        made: &Made,
+        ends: ImageId,
     ) -> (Found, ImageId) {
         let name = &inputs.light_name;
         let size = inputs.camera.size();
         let [across, down] = tile_counts(size);
+        let Made {
+            pool,
+            chunk_boxes,
+            lists,
+            ..
+        } = *made;
         let mut penumbra = TileList::create(graph, &format!("{NAME}.penumbra {name}"), size);
         let mut pass = graph.pass(format!("{NAME}.penumbra {name}"), PassKind::Transfer);
         penumbra.clear(&mut pass);
@@ -310,6 +335,7 @@ impl Lists {
         let tiles = penumbra;
         let found = Found {
             pool,
+            chunk_boxes,
             lists,
             ends,
             tiles,

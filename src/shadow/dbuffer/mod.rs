@@ -174,6 +174,7 @@ fn add_visibility<'f>(
     let (params, hard, numbers) = (tools.params, tools.hard, tools.silhouettes.list);
     let lists::Found {
         pool,
+        chunk_boxes,
         lists,
         ends,
         tiles,
@@ -193,6 +194,7 @@ fn add_visibility<'f>(
         numbers,
         ends,
         pool,
+        chunk_boxes,
         lists,
         hard,
     ];
@@ -227,6 +229,7 @@ fn add_visibility<'f>(
             Bind::sampled(17, tiles.tiles, nearest),
             Bind::uniform(18, through),
             Bind::sampled(19, ends, nearest),
+            Bind::sampled(20, chunk_boxes, nearest),
         ];
         let pipeline = ComputePipelineDesc {
             constants: vec![(0, shape), (1, fours), (2, masked)],

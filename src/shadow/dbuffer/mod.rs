@@ -17,7 +17,7 @@
 //! | `silhouettes.*` | the list of edges ([`super::silhouettes`]), kept while light and casters stand still |
 //! | `boxes` | the ends of edges, boxes around 16, 256 and 4096 of them |
 //! | `start`, `tiles`, `shafts` | tiles that some of the light is above, what is between both |
-//! | `lists` | the edges of each tile |
+//! | `lists` | the edges of each tile, in chunks with boxes around them |
 //! | `cutouts` | its triangles with holes, if the scene has any: these hide samples of the light |
 //! | `through` | whether a surface cuts through the light: then rays to samples of it decide, as in tiles with very many edges |
 //! | `settle` | tiles without edges; a list of the others |

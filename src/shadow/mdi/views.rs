@@ -52,37 +52,37 @@ pub(super) fn mdi_views(
     (boxes, blocks): (&[[Vec3; 8]], &[bool]),
     (options, picture): (&MdiOptions, [u32; 2]),
 ) -> MdiViews {
-    let pairs = boxes.iter().zip(blocks);
-    let casters: Vec<_> = pairs
-        .filter(|(_, blocks)| **blocks)
-        .map(|(b, _)| *b)
-        .collect();
-    let corners = || casters.iter().flatten().map(|corner| corner.as_dvec3());
+    // Buckets span what there is, blocker or not: they stay where they are when a blocker is added.
+    let corners = || boxes.iter().flatten().map(|corner| corner.as_dvec3());
     let mut around = Aabb::EMPTY;
-    casters.iter().flatten().for_each(|p| around.insert(*p));
+    boxes.iter().flatten().for_each(|p| around.insert(*p));
     let sun = light.shape.is_sun();
     let reach = f64::from(light.shape.reach());
     let center = light.center.as_dvec3();
-    let distances = casters.iter().map(|b| distance_to(b, center));
-    let nearest = distances.fold(f64::INFINITY, f64::min);
+    let nearest_of = |only_blockers: bool| {
+        let pairs = boxes.iter().zip(blocks);
+        let pairs = pairs.filter(|(_, blocks)| **blocks || !only_blockers);
+        let distances = pairs.map(|(b, _)| distance_to(b, center));
+        distances.fold(f64::INFINITY, f64::min)
+    };
+    let nearest = nearest_of(false);
     let views = if sun {
         let middle = around.center().as_dvec3();
         let radius = corners().map(|p| p.distance(middle)).fold(0.0, f64::max);
         light_views(light, receivers, &around, reach * radius)
     } else {
         // Rays pass blockers near the light far beside the receivers: these must be in some view too.
-        let close = |b: &&[Vec3; 8]| reach > MOST_MARGIN * distance_to(b, center);
-        let close = casters.iter().filter(close);
-        let close = close.map(|corners| corners.map(|p| p.as_dvec3()).to_vec());
+        let pairs = boxes.iter().zip(blocks).filter(|(_, blocks)| **blocks);
+        let close = pairs.filter(|(b, _)| reach > MOST_MARGIN * distance_to(b, center));
+        let close = close.map(|(corners, _)| corners.map(|p| p.as_dvec3()).to_vec());
         let mut seen = receivers.to_vec();
         seen.extend(close.take(if receivers.is_empty() { 0 } else { usize::MAX }));
-        let margin = (reach / nearest.max(reach).max(1.0e-6)).min(MOST_MARGIN);
+        let margin = (reach / nearest_of(true).max(reach).max(1.0e-6)).min(MOST_MARGIN);
         light_views(light, &seen, &around, margin)
     };
     let count = views.views.len() as u32;
     let across = views.views.first().map_or(0.0, |view| {
-        let corners = boxes.iter().flatten().map(|p| p.as_dvec3() - center);
-        penumbra_across(view, 2.0 * reach, corners, sun)
+        penumbra_across(view, 2.0 * reach, corners().map(|p| p - center), sun)
     });
     let size = options.side(picture, count, across);
     let room = u64::from(options.depths) * u64::from(size * size) * u64::from(count.max(1));

@@ -251,11 +251,12 @@ struct Level {
     float layers;
     uint samples;
     vec2 place; // the first of them
+    vec2 last;
 };
 
 // The fewest layers that are at least as many as asked for.
 Level next_level(Coverage found, bool whole, vec3 horizon, float least) {
-    Level level = Level(1.0e9, 0u, vec2(0.0));
+    Level level = Level(1.0e9, 0u, vec2(0.0), vec2(0.0));
     for (uint i = 0u; i < FOURS; ++i) {
         vec4 all = all_layers(found.layers[i]);
         vec4 layers = whole ? all : mix(vec4(1.0e9), all, above_plane(horizon, i));
@@ -264,6 +265,7 @@ Level next_level(Coverage found, bool whole, vec3 horizon, float least) {
             bool fewer = here < level.layers;
             vec2 place = vec2(params.samples[2u * i][j], params.samples[2u * i + 1u][j]);
             level.place = fewer ? place : level.place;
+            level.last = here < 1.0e9 && here <= level.layers ? place : level.last;
             level.samples = fewer ? 1u : level.samples + (here < 1.0e9 && here == level.layers ? 1u : 0u);
             level.layers = min(level.layers, here);
         }
@@ -325,12 +327,17 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     // the samples may have fewer still, or rounding has taken a layer too many off one sample.
     bool known = center_seen && fewest == 0.0;
     bool again = whole && fewest == 0.0 && found.lighter > 0.0;
+    // A ray that passes an edge within rounding may be blocked where its edges say that it is not.
+    bool once_more = level.samples > FEW_SAMPLES && fewest == level.layers;
     uint steps = 0u;
     for (uint i = 0u; i < MOST_RAYS && !known; ++i) {
         known = !ray_is_blocked(p, to_light_place(r, target), sun, params.counts.z, rounding_m, SOLID, steps);
         if (!known && center_seen) {
             fewest = 0.0;
             known = true;
+        } else if (!known && once_more) {
+            once_more = false;
+            target = level.last;
         } else if (!known && level.samples <= FEW_SAMPLES && level.layers <= 0.0) {
             level = next_level(found, whole, horizon, level.layers + 0.5);
             fewest = level.layers;

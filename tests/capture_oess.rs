@@ -3,10 +3,10 @@
 
 mod support;
 
-use antumbra::capture::FrameRequest;
 use antumbra::light::LightShape;
 use antumbra::scene::{Primitive, Scene};
-use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, scene};
+use support::plates::{HEIGHT, SIZE, floor, floor_x, plate, scene};
+use support::rig::render;
 
 /// Half the length of the line along x, metres.
 const HALF: f32 = 1.0;
@@ -16,22 +16,6 @@ type Plate = (f32, [f32; 2]);
 
 fn line(length: f32) -> LightShape {
     LightShape::Line { length }
-}
-
-fn render(scene: &Scene, techniques: &[&str]) -> Vec<Vec<f32>> {
-    support::rig::with_renderer(scene, |renderer| {
-        let images = techniques.iter().map(|technique| {
-            let request = FrameRequest {
-                camera: camera(),
-                size: [SIZE; 2],
-                lights: vec![0],
-                technique: technique.parse().unwrap(),
-            };
-            let mut frame = renderer.render(&request).unwrap();
-            frame.lights.remove(0).visibility
-        });
-        images.collect()
-    })
 }
 
 /// Part of the line that level plates, given by depth and x range, leave free of a point of the floor.

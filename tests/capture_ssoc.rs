@@ -10,6 +10,7 @@ use antumbra::shadow::Technique;
 use glam::{Vec2, Vec3};
 use std::collections::BTreeMap;
 use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, quad, scene};
+use support::rig::render;
 
 const DISK: LightShape = LightShape::Disk { radius: 1.0 };
 
@@ -19,22 +20,6 @@ fn disk(count: u32) -> impl Iterator<Item = [f32; 2]> {
         let radius = ((i as f32 + 0.5) / count as f32).sqrt();
         let turn = 2.399_963_2 * i as f32;
         [radius * turn.cos(), radius * turn.sin()]
-    })
-}
-
-fn render(scene: &Scene, techniques: &[&str]) -> Vec<Vec<f32>> {
-    support::rig::with_renderer(scene, |renderer| {
-        let images = techniques.iter().map(|technique| {
-            let request = FrameRequest {
-                camera: camera(),
-                size: [SIZE; 2],
-                lights: vec![0],
-                technique: technique.parse().unwrap(),
-            };
-            let mut frame = renderer.render(&request).unwrap();
-            frame.lights.remove(0).visibility
-        });
-        images.collect()
     })
 }
 

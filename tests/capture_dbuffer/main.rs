@@ -11,27 +11,12 @@ use antumbra::light::{AreaLight, LightShape};
 use antumbra::scene::{AlphaMode, Material, Primitive, Scene, SceneCamera};
 use glam::Vec3;
 use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, scene};
+use support::rig::render;
 
 const DISK: LightShape = LightShape::Disk { radius: 1.0 };
 
 /// A level rectangle: depth below the light, x range, z range.
 type Plate = (f32, [f32; 2], [f32; 2]);
-
-fn render(scene: &Scene, techniques: &[&str]) -> Vec<Vec<f32>> {
-    support::rig::with_renderer(scene, |renderer| {
-        let images = techniques.iter().map(|technique| {
-            let request = FrameRequest {
-                camera: camera(),
-                size: [SIZE; 2],
-                lights: vec![0],
-                technique: technique.parse().unwrap(),
-            };
-            let mut frame = renderer.render(&request).unwrap();
-            frame.lights.remove(0).visibility
-        });
-        images.collect()
-    })
-}
 
 /// Places on a unit disk, or -1 to 1 along both axes of a square, evenly.
 fn places(shape: LightShape, count: u32) -> Vec<[f32; 2]> {

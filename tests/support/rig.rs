@@ -2,8 +2,10 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use antumbra::capture::FrameRenderer;
+use antumbra::capture::{FrameRenderer, FrameRequest};
 use antumbra::scene::Scene;
+
+use super::plates::{SIZE, camera};
 
 static SHARED: Mutex<Option<FrameRenderer<'static>>> = Mutex::new(None);
 
@@ -27,4 +29,22 @@ pub fn with_renderer<T>(scene: &Scene, draw: impl FnOnce(&mut FrameRenderer<'sta
     super::assert_no_messages(&renderer.gpu().messages());
     *SHARED.lock().unwrap_or_else(PoisonError::into_inner) = Some(renderer);
     drawn
+}
+
+/// Visibility of a scene's first light on the floor below `plates::camera`, by each technique.
+#[track_caller]
+pub fn render(scene: &Scene, techniques: &[&str]) -> Vec<Vec<f32>> {
+    with_renderer(scene, |renderer| {
+        let images = techniques.iter().map(|technique| {
+            let request = FrameRequest {
+                camera: camera(),
+                size: [SIZE; 2],
+                lights: vec![0],
+                technique: technique.parse().unwrap(),
+            };
+            let mut frame = renderer.render(&request).unwrap();
+            frame.lights.remove(0).visibility
+        });
+        images.collect()
+    })
 }

@@ -270,6 +270,17 @@ fn work_is_left_out_and_counted(rig: &mut Rig) {
     assert_eq!(early.counters["depths_listed"], depths);
     // The bar covers a 20th of the view or less; the floor would fill it, but cannot block anything.
     assert!((9_000..20_000).contains(&depths), "{depths}");
+
+    // Of a floor by itself there is no image.
+    rig.0.set_scene(scene(vec![floor()], square(0.3))).unwrap();
+    let frame = rig.0.render(&request(&camera(), SIZE, "mdi")).unwrap();
+    let images = frame
+        .report
+        .passes
+        .iter()
+        .filter(|name| name.starts_with("mdi.count"));
+    assert_eq!(images.count(), 0, "{:?}", frame.report.passes);
+    assert!(frame.lights[0].visibility.iter().all(|v| *v == 1.0));
 }
 
 /// P Q (R + 8) + 4 S bytes for P Q texels, masks of R bytes and S depths: here with room for a number of

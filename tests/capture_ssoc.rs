@@ -9,7 +9,7 @@ use antumbra::scene::{AlphaMode, Material, Primitive, Scene, Texture, TextureIma
 use antumbra::shadow::Technique;
 use glam::{Vec2, Vec3};
 use std::collections::BTreeMap;
-use support::plates::{HEIGHT, SIZE, camera, floor, floor_x, plate, quad, scene};
+use support::plates::{HEIGHT, SIZE, camera, errors, floor, floor_x, plate, quad, scene};
 use support::rig::render;
 
 const DISK: LightShape = LightShape::Disk { radius: 1.0 };
@@ -59,22 +59,6 @@ fn under(plates: &[(f32, [f32; 2], [f32; 2])], shape: LightShape) -> Scene {
         .map(|(depth, x, z)| plate("blocker", *x, *z, *depth));
     let all: Vec<Primitive> = std::iter::once(floor()).chain(plates).collect();
     scene(all, shape)
-}
-
-/// Root mean square and largest error over a picture of the floor, every `step`-th pixel.
-fn errors(image: &[f32], step: u32, truth: impl Fn(Vec3) -> f32) -> (f32, f32) {
-    let (mut squares, mut worst, mut count) = (0.0, 0.0_f32, 0);
-    for y in (0..SIZE).step_by(step as usize) {
-        for x in (0..SIZE).step_by(step as usize) {
-            // -Z is up in the picture, so rows go along +Z.
-            let p = Vec3::new(floor_x(x), 0.0, floor_x(y));
-            let error = (image[(y * SIZE + x) as usize] - truth(p)).abs();
-            squares += error * error;
-            worst = worst.max(error);
-            count += 1;
-        }
-    }
-    ((squares / count as f32).sqrt(), worst)
 }
 
 /// Largest change of the error from one pixel of a row to the next: what shows as stairs.

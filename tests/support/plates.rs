@@ -68,3 +68,19 @@ pub fn camera() -> SceneCamera {
 pub fn floor_x(column: u32) -> f32 {
     1.6 * ((column as f32 + 0.5) / (SIZE / 2) as f32 - 1.0)
 }
+
+/// Root mean square and largest error over a picture of the floor, every `step`-th pixel.
+pub fn errors(image: &[f32], step: u32, mut truth: impl FnMut(Vec3) -> f32) -> (f32, f32) {
+    let (mut squares, mut worst, mut count) = (0.0, 0.0_f32, 0);
+    for y in (0..SIZE).step_by(step as usize) {
+        for x in (0..SIZE).step_by(step as usize) {
+            // -Z is up in the picture, so rows go along +Z.
+            let p = Vec3::new(floor_x(x), 0.0, floor_x(y));
+            let error = (image[(y * SIZE + x) as usize] - truth(p)).abs();
+            squares += error * error;
+            worst = worst.max(error);
+            count += 1;
+        }
+    }
+    ((squares / count as f32).sqrt(), worst)
+}

@@ -10,6 +10,7 @@ use crate::graph::{
 };
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
+use std::cmp::Reverse;
 use std::ops::Range;
 
 /// Most workgroups in one direction of a dispatch.
@@ -242,11 +243,19 @@ impl Runs {
             let (first, last) = (&draws[part.start], &draws[part.end - 1]);
             first.first_index / 3..(last.first_index + last.index_count) / 3
         };
-        while parts.len() > MOST_RUNS {
-            let gap = |i: &usize| triangles(&(parts[*i].end..parts[*i + 1].start)).len();
-            let least = (0..parts.len() - 1).min_by_key(gap).unwrap_or(0);
-            parts[least].end = parts.remove(least + 1).end;
-        }
+        // The widest gaps stay.
+        let gap = |i: &usize| Reverse(triangles(&(parts[*i - 1].end..parts[*i].start)).len());
+        let mut gaps: Vec<usize> = (1..parts.len()).collect();
+        gaps.sort_by_key(gap);
+        gaps.truncate(MOST_RUNS - 1);
+        gaps.sort_unstable();
+        let ends = gaps
+            .iter()
+            .map(|i| parts[i - 1].end)
+            .chain(parts.last().map(|last| last.end));
+        let starts = parts.first().map(|first| first.start).into_iter();
+        let starts = starts.chain(gaps.iter().map(|i| parts[*i].start));
+        let parts: Vec<Range<usize>> = starts.zip(ends).map(|(start, end)| start..end).collect();
         for part in &parts {
             blocks[part.clone()].fill(true);
         }

@@ -1,4 +1,4 @@
-.PHONY: help demo test bench bench-check bench-plan bench-batch figures study studies slurm-test cluster-check clean-deps
+.PHONY: help demo test bench bench-check bench-plan bench-batch figures study studies wgpu-host slurm-test cluster-check clean-deps
 
 # For make bench: scenes, what is held against each other, picture size, and where it goes.
 SCENES ?= assets
@@ -25,6 +25,7 @@ help:
 	@echo "make studies     the tables of all"
 	@echo "make bench-plan  criterion benchmarks of the render graph"
 	@echo "make bench-batch throughput of a batch against a process for each item"
+	@echo "make wgpu-host   lints and runs examples/wgpu-host, an engine on wgpu, to out/wgpu-host.ppm"
 	@echo "make slurm-test  32 tasks of a real Slurm on this machine against one process; needs root"
 	@echo "make cluster-check  the Kubernetes manifest against its schema"
 	@echo "make clean-deps  remove what set-up unpacked into .deps/"
@@ -69,6 +70,13 @@ bench-batch:
 	scripts/setup.sh demo
 	cargo build --release
 	scripts/bench_batch.py $(BIN)
+
+# On its own, because wgpu takes minutes to build. Fails if the validation layer has a message.
+wgpu-host:
+	scripts/setup.sh test
+	mkdir -p out
+	cd examples/wgpu-host && cargo fmt --check && cargo clippy --locked -- -D warnings && \
+		cargo run --locked -- ../../out/wgpu-host.ppm
 
 slurm-test:
 	cargo build --release

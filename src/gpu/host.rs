@@ -169,6 +169,97 @@ impl RequiredFeatures {
     }
 }
 
+/// Structures for those of our features that a chain of another engine's making has no place for.
+///
+/// An engine that makes `VkDeviceCreateInfo` itself and lends it before the device exists (as wgpu's Vulkan
+/// backend does) has its features in structures that must not appear twice, so [`RequiredFeatures::chain`] cannot
+/// simply be added to them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ExtraFeatures {
+    host_query_reset: vk::PhysicalDeviceHostQueryResetFeatures<'static>,
+    dynamic_rendering: vk::PhysicalDeviceDynamicRenderingFeatures<'static>,
+    synchronization2: vk::PhysicalDeviceSynchronization2Features<'static>,
+    maintenance4: vk::PhysicalDeviceMaintenance4Features<'static>,
+}
+
+impl ExtraFeatures {
+    /// Switches our features on where `info`'s chain has a structure for them, and chains one of ours where it has
+    /// none. Nothing is switched off.
+    ///
+    /// # Safety
+    /// The chain of `info` consists of live structures that nobody else is using.
+    pub unsafe fn complete<'a>(
+        &'a mut self,
+        mut info: vk::DeviceCreateInfo<'a>,
+    ) -> vk::DeviceCreateInfo<'a> {
+        use vk::StructureType as S;
+        let [mut reset, mut rendering, mut sync, mut maintenance] = [false; 4];
+        let mut next = info.p_next.cast_mut().cast::<vk::BaseOutStructure<'_>>();
+        while !next.is_null() {
+            // SAFETY: links of the chain are live by the caller's promise, and a structure is of the kind that its
+            // type says.
+            unsafe {
+                match (*next).s_type {
+                    S::PHYSICAL_DEVICE_VULKAN_1_2_FEATURES => {
+                        let features = next.cast::<vk::PhysicalDeviceVulkan12Features<'_>>();
+                        (*features).host_query_reset = vk::TRUE;
+                        reset = true;
+                    }
+                    S::PHYSICAL_DEVICE_VULKAN_1_3_FEATURES => {
+                        let features = next.cast::<vk::PhysicalDeviceVulkan13Features<'_>>();
+                        (*features).dynamic_rendering = vk::TRUE;
+                        (*features).synchronization2 = vk::TRUE;
+                        (*features).maintenance4 = vk::TRUE;
+                        [rendering, sync, maintenance] = [true; 3];
+                    }
+                    S::PHYSICAL_DEVICE_HOST_QUERY_RESET_FEATURES => {
+                        let features = next.cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>();
+                        (*features).host_query_reset = vk::TRUE;
+                        reset = true;
+                    }
+                    S::PHYSICAL_DEVICE_DYNAMIC_RENDERING_FEATURES => {
+                        let features =
+                            next.cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>();
+                        (*features).dynamic_rendering = vk::TRUE;
+                        rendering = true;
+                    }
+                    S::PHYSICAL_DEVICE_SYNCHRONIZATION_2_FEATURES => {
+                        let features =
+                            next.cast::<vk::PhysicalDeviceSynchronization2Features<'_>>();
+                        (*features).synchronization2 = vk::TRUE;
+                        sync = true;
+                    }
+                    S::PHYSICAL_DEVICE_MAINTENANCE_4_FEATURES => {
+                        let features = next.cast::<vk::PhysicalDeviceMaintenance4Features<'_>>();
+                        (*features).maintenance4 = vk::TRUE;
+                        maintenance = true;
+                    }
+                    _ => {}
+                }
+                next = (*next).p_next;
+            }
+        }
+        *self = Self::default();
+        if !reset {
+            self.host_query_reset.host_query_reset = vk::TRUE;
+            info = info.push_next(&mut self.host_query_reset);
+        }
+        if !rendering {
+            self.dynamic_rendering.dynamic_rendering = vk::TRUE;
+            info = info.push_next(&mut self.dynamic_rendering);
+        }
+        if !sync {
+            self.synchronization2.synchronization2 = vk::TRUE;
+            info = info.push_next(&mut self.synchronization2);
+        }
+        if !maintenance {
+            self.maintenance4.maintenance4 = vk::TRUE;
+            info = info.push_next(&mut self.maintenance4);
+        }
+        info
+    }
+}
+
 impl Requirements {
     /// What the physical device lacks, one entry each with the reason; empty when it fits.
     ///
@@ -239,6 +330,60 @@ impl Requirements {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of each structure in a chain, its type; none may appear twice.
+    fn types(info: &vk::DeviceCreateInfo<'_>) -> Vec<vk::StructureType> {
+        let mut types = Vec::new();
+        let mut next = info.p_next.cast::<vk::BaseInStructure<'_>>();
+        while !next.is_null() {
+            // SAFETY: the tests chain live structures.
+            unsafe {
+                types.push((*next).s_type);
+                next = (*next).p_next;
+            }
+        }
+        types
+    }
+
+    #[test]
+    fn a_host_s_chain_is_completed() {
+        // None of them there.
+        let mut extra = ExtraFeatures::default();
+        // SAFETY: an empty chain.
+        let info = unsafe { extra.complete(vk::DeviceCreateInfo::default()) };
+        assert_eq!(types(&info).len(), requirements().features.len());
+        // One there and switched off, as wgpu leaves it.
+        let mut theirs = vk::PhysicalDeviceMaintenance4Features::default();
+        let mut other = vk::PhysicalDeviceMultiviewFeatures::default();
+        let info = vk::DeviceCreateInfo::default()
+            .push_next(&mut theirs)
+            .push_next(&mut other);
+        let mut extra = ExtraFeatures::default();
+        // SAFETY: both structures are live.
+        let info = unsafe { extra.complete(info) };
+        let found = types(&info);
+        assert_eq!(found.len(), 5);
+        for (at, kind) in found.iter().enumerate() {
+            assert!(!found[..at].contains(kind), "{kind:?} twice");
+        }
+        assert_eq!(theirs.maintenance4, vk::TRUE);
+        assert_eq!(other.multiview, vk::FALSE);
+        // All of them in the structures of the versions.
+        let mut theirs12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut theirs13 = vk::PhysicalDeviceVulkan13Features::default();
+        let info = vk::DeviceCreateInfo::default()
+            .push_next(&mut theirs12)
+            .push_next(&mut theirs13);
+        let mut extra = ExtraFeatures::default();
+        // SAFETY: both structures are live.
+        let info = unsafe { extra.complete(info) };
+        assert_eq!(types(&info).len(), 2);
+        let has = RequiredFeatures {
+            vulkan12: theirs12,
+            vulkan13: theirs13,
+        };
+        assert!(requirements().features.iter().all(|f| has.has(f.name)));
+    }
 
     #[test]
     fn every_listed_feature_is_switched_on() {

@@ -33,7 +33,8 @@ pub use error::GpuError;
 pub use gpu_allocator::MemoryLocation;
 pub use gpu_allocator::vulkan::Allocation;
 pub use host::{
-    HostDevice, OptionalFeatures, RequiredFeatures, Requirement, Requirements, requirements,
+    ExtraFeatures, HostDevice, OptionalFeatures, RequiredFeatures, Requirement, Requirements,
+    requirements,
 };
 pub use memory::{Buffer, Image, ImageSpec, MemoryUse};
 pub use pipeline_desc::{

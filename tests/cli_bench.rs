@@ -121,6 +121,15 @@ fn a_small_benchmark_has_results_and_a_page() -> Result {
         assert!(!page.contains(outside), "{outside}");
     }
 
+    let plot = fs::read_to_string(folder.join("out/plot.svg"))?;
+    assert!(plot.starts_with("<svg xmlns=") && plot.trim_end().ends_with("</svg>"));
+    for label in labels {
+        assert!(
+            plot.contains(&format!("data-technique=\"{label}\"")),
+            "{label}"
+        );
+    }
+
     // All is done: going on measures nothing, so that times stay what they were.
     let output = small(folder, &labels.join(";"), &["--resume"])?;
     assert_eq!(output.status.code(), Some(0));

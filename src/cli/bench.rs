@@ -38,8 +38,8 @@ the technique before it.
 
 Every light of every scene is measured, each in a process of its own, all techniques in turn. A
 technique that fails or crashes is recorded in the results and the rest goes on; the exit code is
-then 1 at the end. DIR/results.json has all numbers, DIR/report.html shows them; the page needs
-nothing else.
+then 1 at the end. DIR/results.json has all numbers, DIR/report.html shows them and needs nothing
+else, DIR/plot.svg is its plot over all scenes.
 
 A study is a TOML file of tables: scenes, techniques, light scales, sizes and columns of each. Its
 tables go to DIR/study.md, the benchmarks that they are made of to DIR/TABLE/SIZE. --size, --samples,
@@ -98,7 +98,7 @@ pub(super) struct BenchArgs {
     #[arg(long, value_name = "NAME|INDEX")]
     device: Option<String>,
 
-    /// Folder for results.json, report.html and images; made if it is not there
+    /// Folder for results.json, report.html, plot.svg and images; made if it is not there
     #[arg(long, value_name = "DIR", required_unless_present = "worker")]
     pub(super) out: Option<PathBuf>,
 
@@ -210,6 +210,8 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     let mut session = open(args, &blank, &out)?;
     measure(&mut session, &jobs, &Progress::new(jobs.len() as u64))?;
     page.write(report::page(session.results(), &shared).as_bytes())?;
+    let plot = Output::File(out.join("plot.svg"));
+    plot.write(report::plot(session.results()).as_bytes())?;
     print_text(&summary(session.results(), &session.file(), &page))?;
     judge([session.results()], session.file())
 }

@@ -44,6 +44,11 @@ pub fn page(results: &Results, folder: &Path) -> String {
     page
 }
 
+/// The page's plot over all scenes, error against time, as an SVG file.
+pub fn plot(results: &Results) -> String {
+    summary::plot_alone(results, Families(&families(results)))
+}
+
 /// Techniques and rivals by name, in order.
 fn families(results: &Results) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();

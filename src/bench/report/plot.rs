@@ -115,7 +115,45 @@ impl Frame {
     }
 }
 
+/// What a plot that stands alone needs of the page's style, on a card of its own.
+const ALONE: &str = "\
+:root { --card: #ffffff; --ink: #16181d; --dim: #5b616e; --grid: #e7e9ee; --front: #16181d;
+  --c0: #0a8573; --c1: #c26a00; --c2: #c2255c; --c3: #1d6fd1; --c4: #7a3fd0; --c5: #6f7d00; --c6: #0086a8; --c7: #8a5a2b; }
+@media (prefers-color-scheme: dark) {
+  :root { --card: #181b21; --ink: #e8eaee; --dim: #a0a7b4; --grid: #262a33; --front: #e8eaee;
+    --c0: #48d1bb; --c1: #ffab4a; --c2: #ff7aa8; --c3: #6cb0ff; --c4: #bd9bff; --c5: #c9d64a; --c6: #4fd0ee; --c7: #d9a877; }
+}
+svg { background: var(--card); font-family: system-ui, -apple-system, \"Segoe UI\", Roboto, \"DejaVu Sans\", sans-serif; }
+.f0 { --c: var(--c0); } .f1 { --c: var(--c1); } .f2 { --c: var(--c2); } .f3 { --c: var(--c3); }
+.f4 { --c: var(--c4); } .f5 { --c: var(--c5); } .f6 { --c: var(--c6); } .f7 { --c: var(--c7); }
+";
+
 impl Plot<'_> {
+    /// As a file of its own, in light and dark.
+    pub(super) fn alone(&self) -> String {
+        let mut text = String::new();
+        self.svg(&mut text, "wide", [720.0, 430.0], 13.0);
+        // The part of the page's style sheet that is about plots; what is for narrow pages hides nothing here.
+        let page = super::STYLE.lines().filter(|line| {
+            let of_plots = [
+                ".plot text",
+                ".plot .",
+                ".grid",
+                ".noise",
+                ".front",
+                ".curve",
+                ".range",
+                ".leader",
+                ".dot",
+            ];
+            of_plots.iter().any(|start| line.starts_with(start))
+        });
+        let style: Vec<&str> = page.collect();
+        let style = format!("<style>\n{ALONE}{}\n</style>\n", style.join("\n"));
+        let text = text.replacen("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" ", 1);
+        text.replacen(">\n", &format!(">\n{style}"), 1)
+    }
+
     /// For wide pages and for narrow ones; the style sheet shows one of them.
     pub(super) fn svgs(&self) -> String {
         let mut text = String::new();

@@ -28,6 +28,19 @@ pub(super) fn write(page: &mut String, results: &Results, families: Families<'_>
 }
 
 fn plot(all: &[Overall], families: Families<'_>) -> String {
+    with_plot(all, families, |plot| plot.svgs())
+}
+
+/// The page's plot over all scenes as an SVG file.
+pub(super) fn plot_alone(results: &Results, families: Families<'_>) -> String {
+    with_plot(&overall(results), families, |plot| plot.alone())
+}
+
+fn with_plot(
+    all: &[Overall],
+    families: Families<'_>,
+    draw: impl FnOnce(&Plot<'_>) -> String,
+) -> String {
     let points: Vec<Point> = (all.iter())
         .filter_map(|one| {
             let (ms, error) = (one.ms?, one.rmse?);
@@ -49,7 +62,7 @@ fn plot(all: &[Overall], families: Families<'_>) -> String {
         families,
         noise: None,
     };
-    plot.svgs()
+    draw(&plot)
 }
 
 /// A small mark in the colour of a family.

@@ -8,7 +8,7 @@ pub use context::{Bind, PassContext};
 pub use resources::FrameCache;
 
 use super::compile::CompiledGraph;
-use super::pass::{Attachment, Load, PassKind};
+use super::pass::{Attachment, Load, PassKind, RecordFn};
 use super::plan::{Barrier, Batch, Plan, PlanPass, ResourceShape};
 use super::resource::{ImagePart, Part};
 use crate::gpu::{Gpu, GpuError};
@@ -69,18 +69,10 @@ impl CompiledGraph<'_> {
                         handles: &handles,
                         views: &mut views,
                     };
-                    if pass.kind == PassKind::Graphics {
-                        begin_rendering(&mut context)?;
-                    }
-                    if let Some(record) = records[*index].take() {
-                        record(&mut context)?;
-                    }
-                    if pass.kind == PassKind::Graphics {
-                        // SAFETY: `cmd` is recording and rendering was begun above.
-                        unsafe { gpu.device().cmd_end_rendering(cmd) };
-                    }
+                    let recorded = record_pass(&mut context, records[*index].take());
                     gpu.end_timing(cmd, timing);
                     gpu.end_label(cmd);
+                    recorded?;
                     report.passes.push(pass.name.to_string());
                 }
             }
@@ -93,6 +85,27 @@ impl CompiledGraph<'_> {
         }
         result
     }
+}
+
+/// Records a pass's own commands. Rendering that was begun ends even where they fail, so that the host can end
+/// its command buffer.
+fn record_pass(
+    context: &mut PassContext<'_>,
+    record: Option<RecordFn<'_>>,
+) -> Result<(), GpuError> {
+    let renders = context.pass.kind == PassKind::Graphics;
+    if renders {
+        begin_rendering(context)?;
+    }
+    let recorded = match record {
+        Some(record) => record(context),
+        None => Ok(()),
+    };
+    if renders {
+        // SAFETY: the command buffer is recording and rendering was begun above.
+        unsafe { context.gpu.device().cmd_end_rendering(context.cmd) };
+    }
+    recorded
 }
 
 fn record_batch(

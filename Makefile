@@ -1,4 +1,4 @@
-.PHONY: help demo test bench bench-check bench-plan bench-batch figures study studies wgpu-host slurm-test cluster-check clean-deps
+.PHONY: help demo test bench bench-check bench-plan bench-batch figures study studies table wgpu-host slurm-test cluster-check clean-deps
 
 # For make bench: scenes, what is held against each other, picture size, and where it goes.
 SCENES ?= assets
@@ -23,6 +23,7 @@ help:
 	@echo "make figures     scenes after the papers' figures, to out/figures/"
 	@echo "make study       the tables of one file of benches/studies/, to out/studies/: STUDY=name"
 	@echo "make studies     the tables of all"
+	@echo "make table       measures what --technique auto chooses by, to src/shadow/auto/reference.tsv"
 	@echo "make bench-plan  criterion benchmarks of the render graph"
 	@echo "make bench-batch throughput of a batch against a process for each item"
 	@echo "make wgpu-host   lints and runs examples/wgpu-host, an engine on wgpu, to out/wgpu-host.ppm"
@@ -61,6 +62,11 @@ study: figures
 
 studies:
 	$(MAKE) study STUDY="$(basename $(notdir $(wildcard benches/studies/*.toml)))"
+
+# Build again afterwards: the table is part of the program.
+table: figures
+	cargo build --release $(EMBREE)
+	$(BIN) bench --study benches/studies/auto.toml --out out/studies/auto $(STUDY_OPTIONS) --table src/shadow/auto/reference.tsv
 
 bench-plan:
 	scripts/setup.sh demo

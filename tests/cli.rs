@@ -1,6 +1,8 @@
 //! The real program: exit codes, the one line on standard error, files whole or not at all.
 #![cfg(feature = "cli")]
 
+#[path = "cli/choice.rs"]
+mod choice;
 #[path = "cli/failures.rs"]
 mod failures;
 #[path = "cli/program.rs"]

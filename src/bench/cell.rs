@@ -27,6 +27,7 @@ pub(super) struct Round {
     pub(super) frame_ms: Option<f64>,
     pub(super) passes: Vec<Pass>,
     pub(super) counters: BTreeMap<String, u64>,
+    pub(super) chosen: Option<String>,
 }
 
 /// Something that can be measured.
@@ -155,6 +156,10 @@ impl<'s> Cell<'s> {
     pub(super) fn counters(&self) -> BTreeMap<String, u64> {
         let last = self.rounds.last();
         last.map(|round| round.counters.clone()).unwrap_or_default()
+    }
+
+    pub(super) fn chosen(&self) -> Option<String> {
+        self.rounds.last()?.chosen.clone()
     }
 
     /// The passes of the last round with their median times. Every round has the same.
@@ -298,6 +303,7 @@ impl Runner for GpuRunner<'_> {
             frame_ms: Some(frame.frame_ms),
             passes,
             counters: frame.counters,
+            chosen: (light.choice.technique != self.request.technique).then(|| light.choice.spec()),
         })
     }
 

@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 use super::cell::{Cell, GpuRunner, RivalRunner, Runner, measure_in_turn};
 use super::contender::{Contender, ContenderError, Method};
 use super::pictures;
-use super::results::{Entry, Failure, FailureKind, ReferenceEntry, StandardError, rounded};
+use super::results::{
+    CaseEntry, Entry, Failure, FailureKind, ReferenceEntry, StandardError, rounded,
+};
 use super::rival::{Engine, Rival};
 use crate::capture::FrameRequest;
 use crate::capture::output::{Output, OutputError};
@@ -19,6 +21,7 @@ use crate::light::{LightOverrides, LightScale};
 use crate::measure::{PENUMBRA, measure};
 use crate::message::line;
 use crate::reference::{Cache, Reference, ReferenceError, Sampling, Settings, Truth};
+use crate::renderer::{NamedLight, SceneBuffers, cases};
 use crate::scene::{LoadOptions, Scene, SceneCamera, SceneError, SceneLight};
 use crate::stress;
 
@@ -229,8 +232,24 @@ fn cast_truth(
         cast_ms,
         image,
         valid_image,
+        case: Some(case(job, scene, camera, light)),
     };
     Ok((truth, entry))
+}
+
+fn case(job: &Job, scene: &Scene, camera: &SceneCamera, light: &SceneLight) -> CaseEntry {
+    let named = NamedLight {
+        name: light.name.clone(),
+        light: light.light,
+    };
+    let buffers = SceneBuffers::plan_only(scene, false);
+    let case = cases(&buffers, camera, job.size, &[named])[0];
+    CaseEntry {
+        angle: case.angle,
+        cone: case.cone,
+        triangles: case.triangles,
+        holes: case.holes,
+    }
 }
 
 /// Rivals with their hierarchies, each built once.
@@ -330,6 +349,7 @@ fn entry(
     entry.passes = cell.passes();
     entry.peak_bytes = cell.peak();
     entry.counters = cell.counters();
+    entry.chosen = cell.chosen();
     if cell.repeats() == 0 {
         return Ok(entry);
     }
@@ -379,6 +399,7 @@ pub(super) fn blank_entry(job: &Job, contender: &Contender) -> Entry {
         technique: contender.name().into(),
         label: contender.label.clone(),
         options: contender.options(),
+        chosen: None,
         driver: None,
         width: job.size[0],
         height: job.size[1],

@@ -34,6 +34,7 @@ pub mod results;
 pub mod rival;
 pub mod session;
 pub mod study;
+pub mod table;
 
 mod cell;
 

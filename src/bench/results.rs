@@ -85,6 +85,19 @@ pub struct ReferenceEntry {
     pub image: String,
     /// File beside `results.json`: white where a pixel is valid.
     pub valid_image: String,
+    /// What the technique `auto` goes by.
+    #[serde(default)]
+    pub case: Option<CaseEntry>,
+}
+
+/// What says how hard a light's shadows are to find: [`Case`](crate::shadow::auto::Case).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct CaseEntry {
+    pub angle: f64,
+    pub cone: f64,
+    pub triangles: f64,
+    pub holes: f64,
 }
 
 /// Of the truth, over its partly lit pixels.
@@ -115,6 +128,9 @@ pub struct Entry {
     pub label: String,
     /// Every option with its value.
     pub options: BTreeMap<String, Value>,
+    /// What a technique that chooses has chosen, as `--technique` takes it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chosen: Option<String>,
     /// Device and driver; of a rival `None`.
     pub driver: Option<String>,
     /// Pixels.

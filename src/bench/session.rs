@@ -279,6 +279,7 @@ mod tests {
             cast_ms: None,
             image: String::new(),
             valid_image: String::new(),
+            case: None,
         };
         Outcome::Done(Box::new(GroupResult { reference, entries }))
     }

@@ -9,6 +9,7 @@ use crate::renderer::{
     Frame, NamedLight, SceneBuffers, UploadError, add_frame_with_masks, add_frame_with_silhouettes,
 };
 use crate::scene::{Scene, SceneCamera};
+use crate::shadow::auto::Choice;
 use crate::shadow::{Technique, TechniqueError};
 use ash::vk;
 use std::collections::BTreeMap;
@@ -61,6 +62,8 @@ pub struct CapturedLight {
     pub passes: Vec<String>,
     /// What the technique counts of its work, by name; of [`FrameRenderer::render_counted`](super::FrameRenderer::render_counted).
     pub counters: BTreeMap<String, u64>,
+    /// The technique, and why.
+    pub choice: Choice,
 }
 
 /// Why a frame could not be had.

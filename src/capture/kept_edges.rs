@@ -5,8 +5,8 @@ use crate::gpu::{Buffer, Gpu, GpuError, Image, ImageSpec, MemoryLocation};
 use crate::graph::{
     Access, BufferDesc, BufferState, Graph, HostBuffer, HostImage, ImageDesc, ImageState, PassKind,
 };
-use crate::shadow::ShadowMask;
 use crate::shadow::silhouettes::{ARGUMENTS_BYTES, Silhouettes};
+use crate::shadow::{ShadowMask, Technique};
 use ash::vk;
 
 /// Lists of the lights of a request, on the device.
@@ -66,7 +66,11 @@ impl KeptSilhouettes {
     /// Whether they are those of a request, provided that the scene and its lights are the same. The
     /// camera does not matter.
     pub(super) fn fit(&self, request: &FrameRequest) -> bool {
-        self.request.lights == request.lights && self.request.technique == request.technique
+        // What is chosen may change with the camera.
+        let is_fixed = !matches!(request.technique, Technique::Auto(_));
+        is_fixed
+            && self.request.lights == request.lights
+            && self.request.technique == request.technique
     }
 
     /// Lights that have one.

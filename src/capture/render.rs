@@ -11,9 +11,10 @@ use crate::graph::{
     Access, BufferDesc, BufferPart, BufferState, FrameCache, FrameReport, Graph, HostBuffer,
     ImagePart, PassKind, Plan,
 };
-use crate::renderer::{Frame, SceneBuffers};
+use crate::renderer::{Frame, SceneBuffers, choices};
 use crate::scene::Scene;
 use crate::shadow::Tally;
+use crate::shadow::auto::Choice;
 use ash::vk;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -157,7 +158,15 @@ impl<'s> FrameRenderer<'s> {
         let reuse = mode == Mode::Static;
         let most = self.gpu.info().limits.max_image_dimension2_d;
         let lights = check(&self.scene, request, most)?;
-        if request.technique.reads_edges() && !self.buffers.has_edges() {
+        let choices = choices(
+            &self.buffers,
+            &request.camera,
+            request.size,
+            &lights,
+            request.technique,
+        );
+        let reads_edges = choices.iter().any(|choice| choice.technique.reads_edges());
+        if reads_edges && !self.buffers.has_edges() {
             let (buffers, scene) = (&mut self.buffers, &*self.scene);
             self.gpu
                 .run(|gpu, cmd| buffers.add_edges(gpu, cmd, scene))?;
@@ -218,7 +227,7 @@ impl<'s> FrameRenderer<'s> {
             CapturedFrame {
                 size: request.size,
                 color: wanted.take(0, bytes),
-                lights: wanted.lights(request, &frame, &plan, bytes),
+                lights: wanted.lights(request, choices, &frame, &plan, bytes),
                 images: wanted.images(bytes),
                 counters: self.counters(&plan, &report, created, [masks_kept, silhouettes_kept]),
                 passes,
@@ -408,12 +417,14 @@ impl ReadBacks {
     fn lights(
         &self,
         request: &FrameRequest,
+        choices: Vec<Choice>,
         frame: &Frame,
         plan: &Plan,
         bytes: &[u8],
     ) -> Vec<CapturedLight> {
         let ranges = request.lights.iter().zip(&frame.visibility_passes);
-        let lights = ranges.enumerate().map(|(at, (light, range))| {
+        let lights = ranges.zip(choices).enumerate();
+        let lights = lights.map(|(at, ((light, range), choice))| {
             let passes = plan.passes.iter();
             let own = passes.filter(|pass| range.contains(&pass.declared));
             let tally = self.tallies.get(at).copied().flatten();
@@ -424,6 +435,7 @@ impl ReadBacks {
                 light: *light,
                 visibility: self.take(1 + at, bytes),
                 passes: own.map(|pass| pass.name.to_string()).collect(),
+                choice,
             }
         });
         lights.collect()

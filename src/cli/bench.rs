@@ -18,9 +18,12 @@ use crate::batch::scene_file::scenes_in;
 use crate::batch::{Cost, SceneFacts, Shard, bench_cost, run_of};
 use crate::bench::contender::Method;
 use crate::bench::results::{FailureKind, Results, ResultsError, Settings};
-use crate::bench::{Contender, Job, Outcome, Session, StudyError, group, parse_list, report};
+use crate::bench::{
+    Contender, Job, Outcome, Session, StudyError, group, parse_list, report, table,
+};
 use crate::capture::output::Output;
 use crate::reference::MAX_SAMPLES;
+use crate::shadow::auto::Table;
 use crate::stress;
 
 const EXAMPLES: &str = "\
@@ -101,6 +104,11 @@ pub(super) struct BenchArgs {
     /// Folder for results.json, report.html, plot.svg and images; made if it is not there
     #[arg(long, value_name = "DIR", required_unless_present = "worker")]
     pub(super) out: Option<PathBuf>,
+
+    /// Write the table of times and errors that `auto` chooses by, and print what its choices are worth on
+    /// scenes left out of it
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["shards", "worker"])]
+    pub(super) table: Option<PathBuf>,
 
     /// Keep what is finished in DIR/results.json and measure the rest
     #[arg(long)]
@@ -212,8 +220,22 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     page.write(report::page(session.results(), &shared).as_bytes())?;
     let plot = Output::File(out.join("plot.svg"));
     plot.write(report::plot(session.results()).as_bytes())?;
+    write_table(args, [session.results()])?;
     print_text(&summary(session.results(), &session.file(), &page))?;
     judge([session.results()], session.file())
+}
+
+/// Writes the table of `--table`.
+pub(super) fn write_table<'r>(
+    args: &BenchArgs,
+    results: impl IntoIterator<Item = &'r Results>,
+) -> Result<(), CliError> {
+    let Some(file) = &args.table else {
+        return Ok(());
+    };
+    let table = Table::new(results.into_iter().flat_map(table::rows).collect());
+    Output::File(file.clone()).write(table.to_string().as_bytes())?;
+    print_text(&table::verdict(&table))
 }
 
 /// Makes a folder and those above it.

@@ -65,6 +65,7 @@ pub(super) fn run(args: &BenchArgs, file: &Path) -> Result<(), CliError> {
     }
     drop(progress);
     print_text(&format!("{page}\n"))?;
+    bench::write_table(args, measured.iter().flatten().map(|one| &one.results))?;
     let results = measured.iter().flatten().map(|measured| &measured.results);
     bench::judge(results, out.join("study.md"))
 }

@@ -33,6 +33,9 @@ pub(super) struct ImageEntry {
     pub(super) light: String,
     pub(super) technique: &'static str,
     pub(super) options: BTreeMap<String, Value>,
+    /// With a technique that chooses: `technique` and `options` are what was chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) chosen: Option<ChosenEntry>,
     /// Device and driver.
     pub(super) driver: String,
     pub(super) width: u32,
@@ -50,6 +53,21 @@ pub(super) struct ImageEntry {
     /// With `--visibility-bound`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) bound: Option<BoundEntry>,
+}
+
+/// Why a light has the technique that it has.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct ChosenEntry {
+    /// The technique that was asked for.
+    pub(super) by: &'static str,
+    /// What `--technique` takes to do the same again.
+    pub(super) spec: String,
+    pub(super) reason: String,
+    /// By the table of measured times and errors.
+    #[serde(serialize_with = "rounded_option")]
+    pub(super) expected_rmse: Option<f64>,
+    #[serde(serialize_with = "rounded_option")]
+    pub(super) expected_ms: Option<f64>,
 }
 
 /// The proven bound on the error of the visibility, over all pixels.

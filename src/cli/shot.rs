@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::error::CliError;
 use super::outputs::{Format, ImageFile};
-use super::report::{BoundEntry, ImageEntry, Measurements, PeakBytes, SetupTimes};
+use super::report::{BoundEntry, ChosenEntry, ImageEntry, Measurements, PeakBytes, SetupTimes};
 use super::summary::single_value;
 use super::template::ImageTemplate;
 use crate::capture::output::{Output, OutputError};
@@ -179,8 +179,15 @@ impl Shot {
             scene: scene.display().to_string(),
             frame: u64::from(self.number),
             light: scene_light.name.clone(),
-            technique: self.technique.name(),
-            options: options(self.technique),
+            technique: light.choice.technique.name(),
+            options: options(light.choice.technique),
+            chosen: (self.technique != light.choice.technique).then(|| ChosenEntry {
+                by: self.technique.name(),
+                spec: light.choice.spec(),
+                reason: light.choice.reason.clone(),
+                expected_rmse: light.choice.expected.map(|expected| expected.rmse),
+                expected_ms: light.choice.expected.map(|expected| expected.ms),
+            }),
             driver: driver.to_owned(),
             width: frame.size[0],
             height: frame.size[1],
@@ -196,7 +203,7 @@ impl Shot {
                 .chain(counters)
                 .map(|(k, n)| (k.clone(), *n))
                 .collect(),
-            remark: self.technique.remark(counters),
+            remark: light.choice.technique.remark(counters),
             // It is the first light's.
             bound: self.bound().filter(|_| at == 0),
         })

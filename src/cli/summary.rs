@@ -107,6 +107,10 @@ pub(super) fn summarize(
                 scene_light.light.shape
             ),
         );
+        if light.choice.technique != shot.technique {
+            let choice = &light.choice;
+            row("chosen", format!("{}: {}", choice.spec(), choice.reason));
+        }
     }
     for image in &frame.images {
         let layers = match image.layers.len() {

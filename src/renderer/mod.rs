@@ -22,9 +22,11 @@ use crate::geometry::{add_gbuffer, add_tile_bounds};
 use crate::graph::{Access, BufferDesc, BufferId, BufferPart, Graph, ImageId, PassKind};
 use crate::light::AreaLight;
 use crate::scene::SceneCamera;
+use crate::shadow::auto::{Case, Choice, Table, choose};
 use crate::shadow::silhouettes::Silhouettes;
 use crate::shadow::{LightParams, ShadowInputs, ShadowMask, Technique, ViewParams, casters};
 use std::ops::Range;
+use std::rc::Rc;
 
 /// A light with the name that its passes and files get.
 #[derive(Clone, Debug)]
@@ -46,6 +48,8 @@ pub struct Frame {
     pub masks: Vec<ShadowMask>,
     /// Passes that make each light's visibility, by place in the order of declaration.
     pub visibility_passes: Vec<Range<usize>>,
+    /// Each light's technique, and why; none where masks of an earlier frame are used.
+    pub choices: Vec<Choice>,
     /// RGBA8 sRGB base colour of each pixel's surface.
     pub albedo: ImageId,
     /// RGBA32F, linear radiance; alpha 1 on surfaces, 0 elsewhere.
@@ -59,6 +63,8 @@ pub struct Visibilities {
     pub masks: Vec<ShadowMask>,
     /// Passes that make each light's visibility, by place in the order of declaration.
     pub passes: Vec<Range<usize>>,
+    /// Each light's technique, and why; none where masks of an earlier frame are used.
+    pub choices: Vec<Choice>,
     /// A uniform buffer with [`ViewParams`] of each light.
     pub params: BufferId,
     /// Where in it each light's are.
@@ -98,11 +104,18 @@ fn visibilities<'f>(
     // Boxes that turn with the triangles grow less around what is turned.
     let boxes = scene.draws().iter().map(|draw| draw.corners);
     let receivers = visible_hulls(camera, size, boxes, scene.covers());
+    let casters_of = |light: &NamedLight| casters(&light.light, &receivers, scene);
+    let casters: Vec<Rc<[bool]>> = lights.iter().map(casters_of).collect();
+    let choices = chosen(lights, technique, || {
+        let both = lights.iter().zip(&casters);
+        both.map(|(named, casters)| Case::new(&named.light, casters, scene, size))
+            .collect()
+    });
     let mut masks = Vec::with_capacity(lights.len());
     let mut passes = Vec::with_capacity(lights.len());
     for (at, (light, part)) in lights.iter().zip(&parts).enumerate() {
         let first = graph.pass_count();
-        masks.push(technique.add_passes(
+        masks.push(choices[at].technique.add_passes(
             graph,
             &ShadowInputs {
                 light_name: light.name.clone(),
@@ -112,7 +125,7 @@ fn visibilities<'f>(
                 tile_bounds,
                 view_params: (params, *part),
                 receivers: receivers.clone(),
-                casters: casters(&light.light, &receivers, scene),
+                casters: casters[at].clone(),
                 scene,
                 ids,
                 silhouettes: silhouettes.get(at).copied().flatten(),
@@ -123,8 +136,50 @@ fn visibilities<'f>(
     Visibilities {
         masks,
         passes,
+        choices,
         params,
         parts,
+    }
+}
+
+/// What [`add_visibility`] and [`add_frame`] do for each light: `technique` itself, or what
+/// [`Technique::Auto`] chooses.
+#[must_use]
+pub fn choices(
+    scene: &SceneBuffers,
+    camera: &SceneCamera,
+    size: [u32; 2],
+    lights: &[NamedLight],
+    technique: Technique,
+) -> Vec<Choice> {
+    chosen(lights, technique, || cases(scene, camera, size, lights))
+}
+
+/// What [`Technique::Auto`] goes by, for each light.
+#[must_use]
+pub fn cases(
+    scene: &SceneBuffers,
+    camera: &SceneCamera,
+    size: [u32; 2],
+    lights: &[NamedLight],
+) -> Vec<Case> {
+    let boxes = scene.draws().iter().map(|draw| draw.corners);
+    let receivers = visible_hulls(camera, size, boxes, scene.covers());
+    let case = |named: &NamedLight| {
+        let casters = casters(&named.light, &receivers, scene);
+        Case::new(&named.light, &casters, scene, size)
+    };
+    lights.iter().map(case).collect()
+}
+
+fn chosen(
+    lights: &[NamedLight],
+    technique: Technique,
+    cases: impl FnOnce() -> Vec<Case>,
+) -> Vec<Choice> {
+    match technique {
+        Technique::Auto(options) => choose(Table::reference(), &cases(), &options),
+        technique => vec![Choice::asked(technique); lights.len()],
     }
 }
 
@@ -187,6 +242,7 @@ pub fn add_frame_with_masks<'f>(
     let found = Visibilities {
         passes: vec![none..none; masks.len()],
         masks,
+        choices: Vec::new(),
         params,
         parts,
     };
@@ -222,6 +278,7 @@ fn shaded<'f>(
         visibility: found.masks.iter().map(|mask| mask.visibility).collect(),
         masks: found.masks,
         visibility_passes: found.passes,
+        choices: found.choices,
         albedo: shading.albedo,
         radiance: shading.radiance,
     }

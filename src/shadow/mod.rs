@@ -1,5 +1,6 @@
 //! Shadow techniques under one interface.
 
+pub mod auto;
 mod casters;
 pub mod dbuffer;
 pub mod hard;

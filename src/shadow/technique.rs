@@ -2,6 +2,7 @@
 //!
 //! A new technique adds its module, one variant here with its arms, and its folder of shaders.
 
+use super::auto::{self, AutoOptions, Case, Table};
 use super::dbuffer::{self, DbufferOptions};
 use super::mdi::{self, MdiOptions};
 use super::occlusion_textures::{self, OcclusionOptions};
@@ -36,6 +37,8 @@ pub enum Technique {
     Dbuffer(DbufferOptions),
     /// Masks of light samples, from lists of the triangles between each tile and the light.
     ShaftMasks(ShaftOptions),
+    /// One of the others for each light, by measured times and errors.
+    Auto(AutoOptions),
 }
 
 /// One option of a technique.
@@ -167,6 +170,7 @@ impl Technique {
         Self::Ssoc(SsocOptions::DEFAULT),
         Self::Dbuffer(DbufferOptions::DEFAULT),
         Self::ShaftMasks(ShaftOptions::DEFAULT),
+        Self::Auto(AutoOptions::DEFAULT),
     ];
 
     /// The name on the command line and in reports.
@@ -181,6 +185,7 @@ impl Technique {
             Self::Ssoc(_) => ssoc::NAME,
             Self::Dbuffer(_) => dbuffer::NAME,
             Self::ShaftMasks(_) => shaft_masks::NAME,
+            Self::Auto(_) => auto::NAME,
         }
     }
 
@@ -210,6 +215,9 @@ impl Technique {
             Self::ShaftMasks(_) => {
                 "light samples that the triangles between each tile and the light hide, exactly"
             }
+            Self::Auto(_) => {
+                "for each light the technique that is expected to be fastest within an error"
+            }
         }
     }
 
@@ -238,16 +246,19 @@ impl Technique {
                 "B. Jakobsen, N. J. Christensen, B. D. Larsen, K. S. Petersen: Boundary Correct \
                  Real-Time Soft Shadows. Computer Graphics International 2004"
             }
-            Self::ShaftMasks(_) => return None,
+            Self::ShaftMasks(_) | Self::Auto(_) => return None,
         })
     }
 
     /// Light shapes that it can do.
     pub fn shapes(self) -> &'static [ShapeKind] {
         match self {
-            Self::Hard | Self::Pcf(_) | Self::Pcss(_) | Self::Mdi(_) | Self::ShaftMasks(_) => {
-                &ShapeKind::ALL
-            }
+            Self::Hard
+            | Self::Pcf(_)
+            | Self::Pcss(_)
+            | Self::Mdi(_)
+            | Self::ShaftMasks(_)
+            | Self::Auto(_) => &ShapeKind::ALL,
             Self::OcclusionTextures(_) => occlusion_textures::SHAPES,
             Self::Oess(_) => oess::SHAPES,
             Self::Ssoc(_) => ssoc::SHAPES,
@@ -267,6 +278,7 @@ impl Technique {
             Self::Ssoc(_) => SsocOptions::ALL,
             Self::Dbuffer(_) => DbufferOptions::ALL,
             Self::ShaftMasks(_) => ShaftOptions::ALL,
+            Self::Auto(_) => AutoOptions::ALL,
         }
     }
 
@@ -283,6 +295,7 @@ impl Technique {
             Self::Ssoc(o) => o.values(),
             Self::Dbuffer(o) => o.values(),
             Self::ShaftMasks(o) => o.values(),
+            Self::Auto(o) => o.values(),
         };
         let names = self.options().iter().map(|option| option.name);
         names.zip(values).collect()
@@ -327,6 +340,7 @@ impl Technique {
             (Self::Ssoc(o), _) => o.set(option, value)?,
             (Self::Dbuffer(o), _) => o.set(option, value)?,
             (Self::ShaftMasks(o), _) => o.set(option, value)?,
+            (Self::Auto(o), _) => o.set(option, value)?,
             (Self::Pcf(o) | Self::Pcss(o), "taps") => o.taps = count()?,
             (Self::Pcss(o), "search") => o.search = count()?,
             (Self::Pcf(o), "radius") => {
@@ -345,6 +359,15 @@ impl Technique {
         Some(())
     }
 
+    /// Whether it does lights of that shape with bright and dark parts.
+    pub(super) fn does_uneven(self, shape: ShapeKind) -> bool {
+        match self {
+            Self::Hard | Self::Mdi(_) | Self::Auto(_) => true,
+            Self::Oess(_) => shape == ShapeKind::Line,
+            _ => false,
+        }
+    }
+
     /// Refuses a light that the technique cannot do.
     ///
     /// # Errors
@@ -353,12 +376,11 @@ impl Technique {
     pub fn check(self, light: &AreaLight) -> Result<(), TechniqueError> {
         let shape = light.shape.kind();
         let technique = self.name();
-        if light.is_uneven() && !matches!(self, Self::Hard | Self::Mdi(_)) {
-            match shape {
-                ShapeKind::Line if matches!(self, Self::Oess(_)) => (),
-                ShapeKind::Line => return Err(TechniqueError::Profile { technique }),
-                _ => return Err(TechniqueError::Weights { technique }),
-            }
+        if light.is_uneven() && !self.does_uneven(shape) {
+            return Err(match shape {
+                ShapeKind::Line => TechniqueError::Profile { technique },
+                _ => TechniqueError::Weights { technique },
+            });
         }
         if self.shapes().contains(&shape) {
             return Ok(());
@@ -371,10 +393,10 @@ impl Technique {
         })
     }
 
-    /// Whether it reads the scene's edges
+    /// Whether it reads, or may read, the scene's edges
     /// ([`SceneBuffers::add_edges`](crate::renderer::SceneBuffers::add_edges)).
     pub fn reads_edges(self) -> bool {
-        matches!(self, Self::Ssoc(_) | Self::Dbuffer(_))
+        matches!(self, Self::Ssoc(_) | Self::Dbuffer(_) | Self::Auto(_))
     }
 
     /// What a light's counters ([`CapturedLight::counters`](crate::capture::CapturedLight::counters)) say
@@ -398,6 +420,12 @@ impl Technique {
             Self::Ssoc(options) => ssoc::add_passes(graph, inputs, options),
             Self::Dbuffer(options) => dbuffer::add_passes(graph, inputs, options),
             Self::ShaftMasks(options) => shaft_masks::add_passes(graph, inputs, options),
+            Self::Auto(options) => {
+                let size = inputs.camera.size();
+                let case = Case::new(&inputs.light, &inputs.casters, inputs.scene, size);
+                let choice = auto::choose(Table::reference(), &[case], &options).remove(0);
+                choice.technique.add_passes(graph, inputs)
+            }
             Self::Pcf(options) | Self::Pcss(options) => {
                 pcss::add_passes(graph, inputs, self.name(), options)
             }

@@ -224,6 +224,7 @@ pub(super) mod tests {
             cast_ms: None,
             image: "none.png".into(),
             valid_image: "none.png".into(),
+            case: None,
         });
         results
     }

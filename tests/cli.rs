@@ -71,7 +71,7 @@ fn a_capture_writes_picture_visibility_and_report() -> Result {
             .arg(at("visibility.exr"))
             .arg("--report")
             .arg(at("report.json"))
-            .args(["--repeat", "3"]),
+            .args(["--technique", "hard", "--repeat", "3"]),
     )?;
     let files = ["picture.png", "report.json", "visibility.exr"];
     assert_eq!(names(folder.path())?, files);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant, SystemTime};
 type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// A moving figure, and stills of two scenes, of which one light is no line.
-const JOBS: &str = "[[job]]\nname = \"walk\"\nscenes = [\"figure.glb\"]\nframes = \"0..12\"\n\
+const JOBS: &str = "[[job]]\nname = \"walk\"\nscenes = [\"figure.glb\"]\ntechniques = [\"hard\"]\nframes = \"0..12\"\n\
     fps = 8\nsize = \"64x64\"\n\
     [[job]]\nname = \"still\"\nscenes = [\"sphere_over_plane.gltf\", \"tube.gltf\"]\n\
     techniques = [\"hard\", \"pcss:taps=8,search=8\", \"oess\"]\nsize = \"64x64\"\n\
@@ -71,7 +71,7 @@ fn images(root: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
             }
             let ending = path.extension().unwrap_or_default();
             assert!(ending != "part", "{path:?}");
-            if ending != "json" && ending != "html" {
+            if !["json", "html", "svg"].iter().any(|other| ending == *other) {
                 found.insert(path.strip_prefix(root)?.into(), fs::read(&path)?);
             }
         }
@@ -370,7 +370,7 @@ fn killed_and_doubled_tasks_do_no_harm() -> Result {
 
 #[test]
 fn an_item_that_fails_is_named_and_the_rest_goes_on() -> Result {
-    let jobs = "[[job]]\nname = \"a\"\nscenes = [\"none.glb\", \"tube.gltf\"]\nsize = \"16x16\"\n\
+    let jobs = "[[job]]\nname = \"a\"\nscenes = [\"none.glb\", \"tube.gltf\"]\nsize = \"16x16\"\ntechniques = [\"hard\"]\n\
         cameras = [0, \"nobody\"]\n";
     let folder = folder(jobs)?;
     let error = text(&batch(folder.path(), &["--out", "out"])?, 1);

@@ -33,7 +33,7 @@ pub struct Job {
     /// glTF files and folders of them, from the folder of the file.
     pub scenes: Vec<String>,
     /// Techniques with their options, as on the command line.
-    #[serde(default = "hard")]
+    #[serde(default = "automatic")]
     pub techniques: Vec<Text<Technique>>,
     /// Absent: all of a scene's lights in one frame.
     pub lights: Option<Lights>,
@@ -261,8 +261,8 @@ impl FromStr for Pixels {
     }
 }
 
-fn hard() -> Vec<Text<Technique>> {
-    "hard".parse().into_iter().collect()
+fn automatic() -> Vec<Text<Technique>> {
+    "auto".parse().into_iter().collect()
 }
 
 fn thirty() -> f64 {

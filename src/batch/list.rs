@@ -337,7 +337,7 @@ mod tests {
         assert_eq!(ids[2], "sweep/a.all+size=2x0_5.hard/0008");
         assert_eq!(ids[4], "sweep/a.lamp.pcss_taps=8/0008");
         assert_eq!(ids[8], "sweep/b.lamp.hard/0008");
-        assert_eq!(ids[16], "one/b.the_front.hard/0000");
+        assert_eq!(ids[16], "one/b.the_front.auto/0000");
         let middle: Vec<String> = list.items(3..9).map(|item| item.id()).collect();
         assert_eq!(middle, ids[3..9]);
         let first = &list.sequences()[0];
@@ -363,7 +363,7 @@ mod tests {
             .map(|error| error.to_string())
             .unwrap_or_default();
         assert!(
-            error.contains("job `x`") && error.contains("`x/a.hard`"),
+            error.contains("job `x`") && error.contains("`x/a.auto`"),
             "{error}"
         );
     }

@@ -14,6 +14,7 @@ use crate::light::{
 };
 use crate::scene::{LoadOptions, Scene, SceneCamera, SceneFile, SceneLight};
 use crate::shadow::Technique;
+use crate::shadow::shaft_masks::ShaftOptions;
 
 /// Largest width and height of a picture.
 const MAX_SIDE: u32 = 16384;
@@ -64,7 +65,7 @@ pub(super) struct ViewArgs {
     scene: PathBuf,
 
     /// Shadow technique with its options, see `antumbra techniques`
-    #[arg(long, value_name = "NAME[:key=value,..]", default_value = "hard", value_parser = parse_technique)]
+    #[arg(long, value_name = "NAME[:key=value,..]", default_value = "auto", value_parser = parse_technique)]
     technique: Technique,
 
     /// Picture size in pixels
@@ -175,6 +176,13 @@ impl ViewArgs {
         let set = self.technique.with_option(option, value);
         self.technique = set.map_err(|error| CliError::Usage(format!("--{option}: {error}")))?;
         Ok(())
+    }
+
+    /// Where the technique is to be chosen, takes the one that proves a bound and can be told how far to go.
+    pub(super) fn choose_a_proof(&mut self) {
+        if matches!(self.technique, Technique::Auto(_)) {
+            self.technique = Technique::ShaftMasks(ShaftOptions::DEFAULT);
+        }
     }
 
     pub(super) fn scene_path(&self) -> &PathBuf {

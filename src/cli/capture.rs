@@ -154,6 +154,15 @@ impl RefinementArgs {
 }
 
 pub(super) fn run(mut args: CaptureArgs) -> Result<(), CliError> {
+    let proves = ["bound", "budget-work"];
+    if args.visibility_bound.is_some()
+        || args
+            .refinement
+            .given()
+            .any(|(option, _)| proves.contains(&option))
+    {
+        args.view.choose_a_proof();
+    }
     for (option, value) in args.refinement.given() {
         args.view.set_option(option, value)?;
     }

@@ -94,6 +94,8 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), CliError> {
         }
         let what = format!("{} cells", gathered.images.len());
         let value = serde_json::to_value(&gathered)?;
+        let plot = Output::File(out.join("plot.svg"));
+        plot.write(bench::report::plot(&gathered).as_bytes())?;
         (value, bench::report::page(&gathered, &out), what)
     };
     if args.no_timings {

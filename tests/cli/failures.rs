@@ -21,7 +21,10 @@ fn wrong_usage_exits_2() -> Result {
         (&["render"], &["render"]),
         (&["capture"], &["SCENE"]),
         (&["capture", SPHERE, "second"], &["second"]),
-        (&["capture", SPHERE, "--budget-ms", "3"], &["--budget-ms"]),
+        (
+            &["capture", SPHERE, "--technique", "hard", "--budget-ms", "3"],
+            &["--budget-ms"],
+        ),
         (&["capture", SPHERE, "--time", "nan"], &["--time", "nan"]),
         (&["capture", SPHERE, "--time", "inf"], &["--time"]),
         (&["capture", SPHERE, "--time", "soon"], &["seconds"]),

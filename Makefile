@@ -1,4 +1,4 @@
-.PHONY: help demo test bench bench-check bench-plan bench-batch figures study studies table wgpu-host slurm-test cluster-check clean-deps
+.PHONY: help demo test bench bench-check bench-plan bench-batch figures study studies table wgpu-host slurm-test cluster-check soak faults clean-deps
 
 # For make bench: scenes, what is held against each other, picture size, and where it goes.
 SCENES ?= assets
@@ -29,6 +29,8 @@ help:
 	@echo "make wgpu-host   lints and runs examples/wgpu-host, an engine on wgpu, to out/wgpu-host.ppm"
 	@echo "make slurm-test  32 tasks of a real Slurm on this machine against one process; needs root"
 	@echo "make cluster-check  the Kubernetes manifest against its schema"
+	@echo "make soak        10,000 frames in one process, an hour"
+	@echo "make faults      every call of the driver and every allocation of a frame fails once, an hour"
 	@echo "make clean-deps  remove what set-up unpacked into .deps/"
 
 demo:
@@ -90,6 +92,14 @@ slurm-test:
 
 cluster-check:
 	scripts/cluster_check.sh
+
+soak:
+	scripts/setup.sh test
+	cargo test --test capture_soak -- --ignored --nocapture ten_thousand_frames
+
+faults:
+	scripts/setup.sh test
+	cargo test --test capture_faults -- --ignored --nocapture
 
 clean-deps:
 	rm -rf .deps

@@ -32,8 +32,8 @@ for file in tests/*.rs tests/*/main.rs; do
     name=${name%/main}
     case $name in
         capture_stress) ;; # see stress_job
-        # Jobs and shards, reports, files, the ray tracer, SPIR-V: the same whatever the driver.
-        cli_batch | cli_bench | cli_reference | shader_modules) gpu_tests+=(--test "$name") ;;
+        # Jobs and shards, reports, files, the ray tracer, SPIR-V, what follows an error: the same whatever the driver.
+        cli_batch | cli_bench | cli_reference | shader_modules | capture_faults | capture_soak | cli_fuzz) gpu_tests+=(--test "$name") ;;
         gpu_* | shader_* | capture* | cli* | embed* | host* | golden*)
             gpu_tests+=(--test "$name")
             driver_tests+=(--test "$name")

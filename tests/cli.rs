@@ -5,6 +5,9 @@
 mod choice;
 #[path = "cli/failures.rs"]
 mod failures;
+#[cfg(unix)]
+#[path = "cli/interrupted.rs"]
+mod interrupted;
 #[path = "cli/program.rs"]
 mod program;
 

@@ -402,9 +402,8 @@ fn light_in_the_name_of_a_picture_wants_one_light() -> Result {
 fn too_little_memory_is_one_line() -> Result {
     let gpu = antumbra::gpu::Gpu::create(&antumbra::gpu::GpuOptions {
         device: std::env::var("ANTUMBRA_DEVICE").ok(),
-        validation: false,
-        pipeline_cache: None,
         application_name: "antumbra tests".into(),
+        ..Default::default()
     })?;
     let instance = gpu.instance();
     // SAFETY: the instance and its device live as long as `gpu`.

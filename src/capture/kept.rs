@@ -1,7 +1,7 @@
 //! What lights' techniques made, kept for frames in which nothing has moved.
 
 use super::frame::FrameRequest;
-use crate::gpu::{Gpu, GpuError, Image, ImageSpec};
+use crate::gpu::{Gpu, GpuError, Image, ImageSpec, Retired};
 use crate::graph::{Access, Graph, HostImage, ImageDesc, ImageId, ImageState, PassKind};
 use crate::shadow::ShadowMask;
 use ash::vk;
@@ -59,11 +59,11 @@ impl KeptMasks {
                 }),
                 Ok((visibility, Err(error))) => {
                     gpu.destroy_image(visibility);
-                    kept.destroy(gpu);
+                    kept.retire(gpu);
                     return Err(error);
                 }
                 Err(error) => {
-                    kept.destroy(gpu);
+                    kept.retire(gpu);
                     return Err(error);
                 }
             }
@@ -111,11 +111,12 @@ impl KeptMasks {
         masks.collect()
     }
 
-    pub(super) fn destroy(self, gpu: &mut Gpu) {
+    /// Gives them back once no frame can still use them.
+    pub(super) fn retire(self, gpu: &mut Gpu) {
         for kept in self.masks {
-            gpu.destroy_image(kept.visibility);
+            gpu.retire(Retired::Image(kept.visibility));
             if let Some(image) = kept.end_influences {
-                gpu.destroy_image(image);
+                gpu.retire(Retired::Image(image));
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Lists of silhouettes, kept for frames in which neither lights nor casters have moved.
 
 use super::frame::FrameRequest;
-use crate::gpu::{Buffer, Gpu, GpuError, Image, ImageSpec, MemoryLocation};
+use crate::gpu::{Buffer, Gpu, GpuError, Image, ImageSpec, MemoryLocation, Retired};
 use crate::graph::{
     Access, BufferDesc, BufferState, Graph, HostBuffer, HostImage, ImageDesc, ImageState, PassKind,
 };
@@ -55,7 +55,7 @@ impl KeptSilhouettes {
             match desc.map(|desc| Kept::new(gpu, desc)).transpose() {
                 Ok(list) => kept.lists.push(list),
                 Err(error) => {
-                    kept.destroy(gpu);
+                    kept.retire(gpu);
                     return Err(error);
                 }
             }
@@ -105,10 +105,11 @@ impl KeptSilhouettes {
             .collect()
     }
 
-    pub(super) fn destroy(self, gpu: &mut Gpu) {
+    /// Gives them back once no frame can still use them.
+    pub(super) fn retire(self, gpu: &mut Gpu) {
         for kept in self.lists.into_iter().flatten() {
-            gpu.destroy_image(kept.list);
-            gpu.destroy_buffer(kept.arguments);
+            gpu.retire(Retired::Image(kept.list));
+            gpu.retire(Retired::Buffer(kept.arguments));
         }
     }
 }

@@ -6,12 +6,12 @@ use super::frame::{
 };
 use super::kept::KeptMasks;
 use super::kept_edges::KeptSilhouettes;
-use crate::gpu::{Buffer, Gpu, GpuError, MemoryLocation, ValidationMessage};
+use crate::gpu::{Buffer, Gpu, GpuError, MemoryLocation, Retired, ValidationMessage};
 use crate::graph::{
     Access, BufferDesc, BufferPart, BufferState, FrameCache, FrameReport, Graph, HostBuffer,
     ImagePart, PassKind, Plan,
 };
-use crate::renderer::{Frame, SceneBuffers, choices};
+use crate::renderer::{Frame, SceneBuffers, UploadError, choices};
 use crate::scene::Scene;
 use crate::shadow::Tally;
 use crate::shadow::auto::Choice;
@@ -52,7 +52,7 @@ impl<'s> FrameRenderer<'s> {
     }
 
     fn with(mut gpu: Gpu, scene: Cow<'s, Scene>) -> Result<Self, CaptureError> {
-        match gpu.run(|gpu, cmd| SceneBuffers::upload(gpu, cmd, &scene)) {
+        match upload(&mut gpu, &scene) {
             Ok(buffers) => Ok(Self {
                 gpu,
                 scene,
@@ -63,10 +63,15 @@ impl<'s> FrameRenderer<'s> {
                 kept_filled: false,
             }),
             Err(error) => {
-                if let Err(second) = gpu.destroy() {
-                    log::warn!("after a failed upload: {second}");
+                match gpu.destroy() {
+                    Ok(messages) => {
+                        for message in messages {
+                            log::warn!("after a failed upload: {message}");
+                        }
+                    }
+                    Err(second) => log::warn!("after a failed upload: {second}"),
                 }
-                Err(error.into())
+                Err(error)
             }
         }
     }
@@ -86,8 +91,7 @@ impl<'s> FrameRenderer<'s> {
             && old.images == scene.images
             && old.bounds == scene.bounds;
         if !same {
-            let upload = |gpu: &mut Gpu, cmd| SceneBuffers::upload(gpu, cmd, &scene);
-            let buffers = self.gpu.run(upload)?;
+            let buffers = upload(&mut self.gpu, &scene)?;
             let old_buffers = std::mem::replace(&mut self.buffers, buffers);
             let earlier = (old_buffers, &*self.scene);
             // `run` has waited: no frame uses the old ones any more.
@@ -139,13 +143,12 @@ impl<'s> FrameRenderer<'s> {
         self.render_one(request, &[], Mode::Static)
     }
 
-    /// `run` has waited: nobody uses them any more.
     fn forget_kept(&mut self) {
         if let Some(kept) = self.kept.take() {
-            kept.destroy(&mut self.gpu);
+            kept.retire(&mut self.gpu);
         }
         if let Some(kept) = self.kept_silhouettes.take() {
-            kept.destroy(&mut self.gpu);
+            kept.retire(&mut self.gpu);
         }
     }
 
@@ -168,8 +171,11 @@ impl<'s> FrameRenderer<'s> {
         let reads_edges = choices.iter().any(|choice| choice.technique.reads_edges());
         if reads_edges && !self.buffers.has_edges() {
             let (buffers, scene) = (&mut self.buffers, &*self.scene);
-            self.gpu
-                .run(|gpu, cmd| buffers.add_edges(gpu, cmd, scene))?;
+            let add = |gpu: &mut Gpu, cmd| buffers.add_edges(gpu, cmd, scene);
+            if let Err(error) = self.gpu.run(add) {
+                self.buffers.forget_edges();
+                return Err(error.into());
+            }
         }
 
         let start = Instant::now();
@@ -187,15 +193,17 @@ impl<'s> FrameRenderer<'s> {
         );
         let frame = declare(&mut graph, &self.buffers, request, &lights, earlier);
         if reuse && masks_kept == 0 {
+            // Until the device has filled them they fit nothing.
+            self.kept_filled = false;
             if let Some(old) = self.kept.take() {
-                old.destroy(&mut self.gpu);
+                old.retire(&mut self.gpu);
             }
             let kept = KeptMasks::new(&mut self.gpu, request, &frame.masks)?;
             kept.fill(&mut graph, &frame.masks);
             self.kept = Some(kept);
             if silhouettes_kept == 0 {
                 if let Some(old) = self.kept_silhouettes.take() {
-                    old.destroy(&mut self.gpu);
+                    old.retire(&mut self.gpu);
                 }
                 let kept = KeptSilhouettes::new(&mut self.gpu, &graph, request, &frame.masks)?;
                 if let Some(kept) = &kept {
@@ -203,8 +211,6 @@ impl<'s> FrameRenderer<'s> {
                 }
                 self.kept_silhouettes = kept;
             }
-            // Until the device has filled them they fit nothing.
-            self.kept_filled = false;
         }
         let wanted = ReadBacks::new(&graph, &frame, request, names, mode == Mode::Counted)?;
         let aside = Instant::now();
@@ -236,7 +242,11 @@ impl<'s> FrameRenderer<'s> {
                 report,
             }
         });
-        self.gpu.destroy_buffer(target);
+        match &result {
+            Ok(_) => self.gpu.destroy_buffer(target),
+            // The device may be writing it still.
+            Err(_) => self.gpu.retire(Retired::Buffer(target)),
+        }
         self.kept_filled |= reuse && result.is_ok();
         result
     }
@@ -277,11 +287,16 @@ impl<'s> FrameRenderer<'s> {
     }
 
     /// Gives everything back; returns what the validation layer said, leaks included.
-    pub fn destroy(mut self) -> Result<Vec<ValidationMessage>, GpuError> {
+    pub fn destroy(self) -> Result<Vec<ValidationMessage>, GpuError> {
+        self.into_gpu().destroy()
+    }
+
+    /// Gives everything back but the device, which frees it when its next frame begins.
+    pub fn into_gpu(mut self) -> Gpu {
         self.forget_kept();
         self.cache.destroy(&mut self.gpu);
-        self.buffers.destroy(&mut self.gpu);
-        self.gpu.destroy()
+        self.buffers.retire(&mut self.gpu);
+        self.gpu
     }
 }
 
@@ -294,6 +309,24 @@ impl FrameRenderer<'static> {
 
 fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1.0e3
+}
+
+fn upload(gpu: &mut Gpu, scene: &Scene) -> Result<SceneBuffers, CaptureError> {
+    let mut made = None;
+    let uploaded = gpu.run(|gpu, cmd| {
+        made = Some(SceneBuffers::upload(gpu, cmd, scene)?);
+        Ok::<_, UploadError>(())
+    });
+    match (uploaded, made) {
+        (Ok(()), Some(buffers)) => Ok(buffers),
+        (Err(error), made) => {
+            if let Some(buffers) = made {
+                buffers.retire(gpu);
+            }
+            Err(error.into())
+        }
+        (Ok(()), None) => unreachable!("what was recorded is there"),
+    }
 }
 
 /// Plans and records a frame, submits it and waits.

@@ -261,9 +261,8 @@ impl<'a> Runner<'a> {
             None => {
                 let mut gpu = Gpu::create(&GpuOptions {
                     device: self.device.map(String::from),
-                    validation: false,
-                    pipeline_cache: None,
                     application_name: "antumbra".into(),
+                    ..Default::default()
                 })?;
                 if let Some(file) = pipeline_cache::file(gpu.info()) {
                     gpu.use_pipeline_cache(file);

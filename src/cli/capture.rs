@@ -311,8 +311,8 @@ impl Job<'_> {
         let mut gpu = Gpu::create(&GpuOptions {
             device: args.device.clone(),
             validation: args.validation,
-            pipeline_cache: None,
             application_name: "antumbra".into(),
+            ..Default::default()
         })?;
         // One file a driver, and which driver it is shows only now.
         if let Some(file) = pipeline_cache::file(gpu.info()) {

@@ -245,6 +245,12 @@ impl SceneBuffers {
         }
     }
 
+    /// Takes [`add_edges`](Self::add_edges) back, whose commands never ran.
+    pub fn forget_edges(&mut self) {
+        // Nobody reads the images, which hold nothing, before others are in their place.
+        self.edges = None;
+    }
+
     /// Takes over what is known of the edges of another moment of the scene, if they are the same:
     /// [`add_edges`](Self::add_edges) does not have to find them anew.
     pub fn continue_edges(&mut self, scene: &Scene, earlier: (Self, &Scene)) -> Self {

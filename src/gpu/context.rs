@@ -34,6 +34,10 @@ pub struct GpuOptions {
     pub pipeline_cache: Option<PathBuf>,
     /// Reported to the driver.
     pub application_name: String,
+    /// Puts functions of the caller's own between us and the driver, for tools that look at calls and
+    /// tests that make them fail. It is handed the device's functions and returns those that are used
+    /// from then on, also by the allocator; the handle has to stay the same.
+    pub intercept: Option<fn(ash::Device) -> ash::Device>,
 }
 
 /// A Vulkan device with allocator, pipelines, descriptors, samplers and timers.
@@ -53,6 +57,8 @@ pub struct Gpu {
     /// it.
     pub(super) allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     pub(super) memory_use: MemoryUse,
+    /// Allocations until the one that is refused.
+    pub(super) refused_allocation: Option<u64>,
     /// The slot of the frame being recorded, below `frames_in_flight`.
     pub(super) slot: usize,
     pub(super) frames_in_flight: u32,
@@ -97,6 +103,10 @@ impl Gpu {
                     return Err(error);
                 }
             };
+        let device = match options.intercept {
+            Some(intercept) => intercept(device),
+            None => device,
+        };
         // SAFETY: the family and its one queue were asked for when the device was created.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
         let host = HostDevice {
@@ -200,6 +210,7 @@ impl Gpu {
             log,
             allocator: ManuallyDrop::new(allocator),
             memory_use: MemoryUse::default(),
+            refused_allocation: None,
             slot: slot_count - 1,
             frames_in_flight: slots,
             retired: (0..slot_count).map(|_| Vec::new()).collect(),

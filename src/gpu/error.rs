@@ -93,6 +93,12 @@ pub enum GpuError {
         /// The device's name.
         device: String,
     },
+    /// The device was used after it had been lost.
+    #[error("the device \"{device}\" was lost; create another")]
+    Lost {
+        /// The device's name.
+        device: String,
+    },
     /// Something that needs a device of our own was asked of a host's device.
     #[error("{what} is not possible on a host's device: the host submits and waits")]
     HostOwned {

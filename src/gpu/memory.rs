@@ -155,6 +155,12 @@ impl Gpu {
         self.memory_use
     }
 
+    /// Refuses one allocation, as if there were no memory for it: that many after the next one. For
+    /// tests of what happens then. `None` refuses none.
+    pub fn refuse_allocation(&mut self, after: Option<u64>) {
+        self.refused_allocation = after;
+    }
+
     fn allocate(
         &mut self,
         name: &str,
@@ -163,6 +169,15 @@ impl Gpu {
         linear: bool,
     ) -> Result<Allocation, GpuError> {
         let bytes = requirements.size;
+        let refused = self.refused_allocation;
+        self.refused_allocation = refused.and_then(|after| after.checked_sub(1));
+        if refused == Some(0) {
+            return Err(GpuError::Allocation {
+                object: name.to_owned(),
+                bytes,
+                source: gpu_allocator::AllocationError::OutOfMemory,
+            });
+        }
         let desc = AllocationCreateDesc {
             name,
             requirements,

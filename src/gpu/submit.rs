@@ -16,8 +16,20 @@ pub(super) struct Submitter {
     cmd: vk::CommandBuffer,
     fence: vk::Fence,
     limit: Duration,
-    /// A submission timed out and may still be running.
-    pending: bool,
+    work: Work,
+}
+
+/// What the last submission does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Work {
+    /// Nothing any more.
+    Done,
+    /// It may be running: the wait for it failed.
+    Running,
+    /// It may be running after the time limit.
+    TimedOut,
+    /// Nothing, on a device that was lost.
+    Lost,
 }
 
 impl Gpu {
@@ -34,7 +46,7 @@ impl Gpu {
             cmd: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
             limit: LIMIT,
-            pending: false,
+            work: Work::Done,
         };
         let buffer_info = vk::CommandBufferAllocateInfo::default()
             .command_pool(pool)
@@ -95,8 +107,9 @@ impl Gpu {
     /// afterwards.
     ///
     /// # Errors
-    /// What `record` returns, [`GpuError::HostOwned`] on a host's device, [`GpuError::Timeout`], or
-    /// a failing call.
+    /// What `record` returns, [`GpuError::HostOwned`] on a host's device, [`GpuError::Timeout`],
+    /// [`GpuError::Busy`] or [`GpuError::Lost`] after an earlier error, or a failing call. After a
+    /// failing wait the device may still use what was recorded: [`retire`](Gpu::retire) it.
     pub fn run<T, E: From<GpuError>>(
         &mut self,
         record: impl FnOnce(&mut Self, vk::CommandBuffer) -> Result<T, E>,
@@ -115,18 +128,19 @@ impl Gpu {
         Ok(value)
     }
 
-    fn busy_or_hosted(&self) -> Result<&Submitter, GpuError> {
-        match &self.submitter {
-            None => Err(GpuError::HostOwned { what: "submitting" }),
-            Some(submitter) if submitter.pending => Err(GpuError::Busy {
-                device: self.info.name.clone(),
-            }),
-            Some(submitter) => Ok(submitter),
-        }
+    fn own_submitter(&mut self, what: &'static str) -> Result<&mut Submitter, GpuError> {
+        (self.submitter.as_mut()).ok_or(GpuError::HostOwned { what })
     }
 
     fn begin_commands(&mut self) -> Result<vk::CommandBuffer, GpuError> {
-        let submitter = self.busy_or_hosted()?;
+        let device = || self.info.name.clone();
+        match self.submitter.as_ref().map(|submitter| submitter.work) {
+            Some(Work::TimedOut) => return Err(GpuError::Busy { device: device() }),
+            Some(Work::Lost) => return Err(GpuError::Lost { device: device() }),
+            Some(Work::Running) => self.wait()?,
+            Some(Work::Done) | None => {}
+        }
+        let submitter = self.own_submitter("submitting")?;
         let (pool, cmd) = (submitter.pool, submitter.cmd);
         self.begin_frame()?;
         let info = vk::CommandBufferBeginInfo::default()
@@ -144,44 +158,44 @@ impl Gpu {
     }
 
     fn submit(&mut self, cmd: vk::CommandBuffer) -> Result<(), GpuError> {
-        let fence = self.busy_or_hosted()?.fence;
+        let fence = self.own_submitter("submitting")?.fence;
+        // SAFETY: the last submission has finished, so the fence is not in use.
+        unsafe { self.device.reset_fences(&[fence]) }.call("vkResetFences", "the frame's fence")?;
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
         let submits = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
         // SAFETY: the buffer is recorded and ended, the fence unsignalled and not in use.
-        unsafe { self.device.queue_submit2(self.queue, &submits, fence) }
-            .call("vkQueueSubmit2", "the frame")?;
-        if let Some(submitter) = &mut self.submitter {
-            submitter.pending = true;
-        }
-        Ok(())
+        let submitted = unsafe { self.device.queue_submit2(self.queue, &submits, fence) };
+        self.own_submitter("submitting")?.work = match submitted {
+            Ok(()) => Work::Running,
+            Err(vk::Result::ERROR_DEVICE_LOST) => Work::Lost,
+            Err(_) => Work::Done,
+        };
+        submitted.call("vkQueueSubmit2", "the frame")
     }
 
     fn wait(&mut self) -> Result<(), GpuError> {
-        let Some(submitter) = &mut self.submitter else {
-            return Err(GpuError::HostOwned { what: "waiting" });
-        };
-        let nanoseconds = u64::try_from(submitter.limit.as_nanos()).unwrap_or(u64::MAX);
-        let fences = [submitter.fence];
+        let submitter = self.own_submitter("waiting")?;
+        let (fences, limit) = ([submitter.fence], submitter.limit);
+        let nanoseconds = u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX);
         // SAFETY: the fence is ours and was submitted.
-        match unsafe { self.device.wait_for_fences(&fences, true, nanoseconds) } {
-            Err(vk::Result::TIMEOUT) => {
-                let limit = submitter.limit;
-                return Err(GpuError::Timeout {
-                    device: self.info.name.clone(),
-                    limit,
-                });
-            }
-            other => other.call("vkWaitForFences", "the frame")?,
+        let waited = unsafe { self.device.wait_for_fences(&fences, true, nanoseconds) };
+        self.own_submitter("waiting")?.work = match waited {
+            Ok(()) => Work::Done,
+            Err(vk::Result::TIMEOUT) => Work::TimedOut,
+            Err(vk::Result::ERROR_DEVICE_LOST) => Work::Lost,
+            Err(_) => Work::Running,
+        };
+        if waited == Err(vk::Result::TIMEOUT) {
+            let device = self.info.name.clone();
+            return Err(GpuError::Timeout { device, limit });
         }
-        submitter.pending = false;
-        // SAFETY: signalled and no longer in use.
-        unsafe { self.device.reset_fences(&fences) }.call("vkResetFences", "the frame's fence")
+        waited.call("vkWaitForFences", "the frame")
     }
 
-    /// Gives a submission that timed out one more time limit to end.
+    /// Gives a submission that may be running one more time limit to end.
     pub(super) fn wait_until_idle(&mut self) -> Result<(), GpuError> {
-        match &self.submitter {
-            Some(submitter) if submitter.pending => match self.wait() {
+        match self.submitter.as_ref().map(|submitter| submitter.work) {
+            Some(Work::Running | Work::TimedOut) => match self.wait() {
                 // A lost device runs nothing any more, and its objects may be destroyed.
                 Err(GpuError::Call {
                     result: vk::Result::ERROR_DEVICE_LOST,
@@ -189,7 +203,7 @@ impl Gpu {
                 }) => Ok(()),
                 other => other,
             },
-            _ => Ok(()),
+            Some(Work::Done | Work::Lost) | None => Ok(()),
         }
     }
 }

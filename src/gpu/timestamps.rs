@@ -177,6 +177,7 @@ impl Gpu {
         }
         let names = std::mem::take(&mut slot.names);
         let mut ready = Vec::with_capacity(names.len());
+        let mut read = Ok(());
         for (chunk, &pool) in names.chunks(SCOPES as usize).zip(&slot.pools) {
             // Value and availability of each query.
             let mut results = vec![[0_u64; 2]; 2 * chunk.len()];
@@ -187,7 +188,8 @@ impl Gpu {
                     .get_query_pool_results(pool, 0, &mut results, flags)
             } {
                 Ok(()) | Err(vk::Result::NOT_READY) => {}
-                Err(result) => return Err(result).call("vkGetQueryPoolResults", "the timestamps"),
+                // Then none is there. The queries have to be made new all the same.
+                Err(result) => read = Err(result),
             }
             for (name, pair) in chunk.iter().zip(results.chunks_exact(2)) {
                 if let &[[begin, begin_there], [end, end_there]] = pair
@@ -207,7 +209,7 @@ impl Gpu {
             unsafe { self.device.reset_query_pool(pool, 0, 2 * SCOPES) };
         }
         self.timestamps.ready = ready;
-        Ok(())
+        read.call("vkGetQueryPoolResults", "the timestamps")
     }
 
     pub(super) fn destroy_timestamps(&mut self) {

@@ -7,6 +7,7 @@
     reason = "each test binary uses its own part"
 )]
 
+pub mod faults;
 #[path = "../../build/glsl.rs"]
 pub mod glsl;
 pub mod host;
@@ -34,8 +35,8 @@ pub fn options() -> GpuOptions {
     GpuOptions {
         device: std::env::var("ANTUMBRA_DEVICE").ok(),
         validation: true,
-        pipeline_cache: None,
         application_name: "antumbra tests".to_owned(),
+        ..Default::default()
     }
 }
 

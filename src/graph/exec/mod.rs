@@ -59,8 +59,6 @@ impl CompiledGraph<'_> {
                 }
                 for index in &step.passes {
                     let pass = &plan.passes[*index];
-                    gpu.begin_label(cmd, &pass.name);
-                    let timing = gpu.begin_timing(cmd, &pass.name)?;
                     let mut context = PassContext {
                         gpu,
                         cmd,
@@ -69,9 +67,9 @@ impl CompiledGraph<'_> {
                         handles: &handles,
                         views: &mut views,
                     };
+                    context.gpu.begin_label(cmd, &pass.name);
                     let recorded = record_pass(&mut context, records[*index].take());
-                    gpu.end_timing(cmd, timing);
-                    gpu.end_label(cmd);
+                    context.gpu.end_label(cmd);
                     recorded?;
                     report.passes.push(pass.name.to_string());
                 }
@@ -87,24 +85,22 @@ impl CompiledGraph<'_> {
     }
 }
 
-/// Records a pass's own commands. Rendering that was begun ends even where they fail, so that the host can end
-/// its command buffer.
+/// Records a pass. After an error too the command buffer is outside rendering, and can be ended.
 fn record_pass(
     context: &mut PassContext<'_>,
     record: Option<RecordFn<'_>>,
 ) -> Result<(), GpuError> {
-    let renders = context.pass.kind == PassKind::Graphics;
-    if renders {
+    let (cmd, pass) = (context.cmd, context.pass);
+    let timing = context.gpu.begin_timing(cmd, &pass.name)?;
+    if pass.kind == PassKind::Graphics {
         begin_rendering(context)?;
     }
-    let recorded = match record {
-        Some(record) => record(context),
-        None => Ok(()),
-    };
-    if renders {
-        // SAFETY: the command buffer is recording and rendering was begun above.
-        unsafe { context.gpu.device().cmd_end_rendering(context.cmd) };
+    let recorded = record.map_or(Ok(()), |record| record(context));
+    if pass.kind == PassKind::Graphics {
+        // SAFETY: `cmd` is recording and rendering was begun above.
+        unsafe { context.gpu.device().cmd_end_rendering(cmd) };
     }
+    context.gpu.end_timing(cmd, timing);
     recorded
 }
 

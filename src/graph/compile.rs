@@ -278,9 +278,11 @@ fn assemble(
         declared,
         reason: cull_reason(decl, declared),
     });
+    let mut culled: Vec<CulledPass> = culled.chain(decl.skipped.iter().cloned()).collect();
+    culled.sort_by_key(|pass| pass.declared);
     Plan {
         resources: resources.collect(),
-        culled: culled.collect(),
+        culled,
         passes,
         steps,
         leave: barriers.leave,

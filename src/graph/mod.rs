@@ -118,6 +118,7 @@ pub(crate) struct Declarations {
     resources: Vec<ResourceDecl>,
     passes: Vec<PassDecl>,
     kept: Vec<usize>,
+    skipped: Vec<CulledPass>,
     error: Option<GraphError>,
 }
 
@@ -154,6 +155,7 @@ impl<'f> Graph<'f> {
                 resources: Vec::new(),
                 passes: Vec::new(),
                 kept: Vec::new(),
+                skipped: Vec::new(),
                 error: None,
             },
             records: Vec::new(),
@@ -228,6 +230,17 @@ impl<'f> Graph<'f> {
         self.records.push(None);
         let pass = self.decl.passes.len() - 1;
         PassBuilder { graph: self, pass }
+    }
+
+    /// Notes that a pass, or several under one name, need not be declared, and why. Shows among those
+    /// that do not run: [`Plan::culled`].
+    pub fn skip(&mut self, name: impl Into<Name>, reason: impl Into<String>) {
+        let skipped = CulledPass {
+            name: name.into(),
+            declared: self.pass_count(),
+            reason: reason.into(),
+        };
+        self.decl.skipped.push(skipped);
     }
 
     /// Number of passes declared so far: the place in [`PlanPass::declared`] that the next one gets.

@@ -192,7 +192,8 @@ pub struct Transition {
 pub struct CulledPass {
     /// Name given by its author.
     pub name: Name,
-    /// Place in the order of declaration.
+    /// Place in the order of declaration; of one that was not declared ([`Graph::skip`](super::Graph::skip))
+    /// that of the next one.
     pub declared: usize,
     /// Why it does not run.
     pub reason: String,

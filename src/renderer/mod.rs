@@ -11,12 +11,14 @@
 //! | `shade.light`, for each light | all of the above | radiance, added |
 
 mod shade;
+mod unlit;
 
 pub use crate::geometry::{
     Draw, GBuffer, PixelCamera, SceneBuffers, SceneIds, UploadError, add_triangle_ids,
     frustum_sees, visible_hulls,
 };
 pub use shade::{Ambient, Shading, ShadingInputs, add_shading};
+pub use unlit::unlit;
 
 use crate::geometry::{add_gbuffer, add_tile_bounds};
 use crate::graph::{Access, BufferDesc, BufferId, BufferPart, Graph, ImageId, PassKind};
@@ -259,6 +261,10 @@ fn shaded<'f>(
 ) -> Frame {
     let size = graph.image_desc(gbuffer.view_depth);
     let size = size.map_or([1, 1], |desc| [desc.width, desc.height]);
+    let boxes = scene.draws().iter().map(|draw| draw.corners);
+    let receivers = visible_hulls(camera, size, boxes, scene.covers());
+    let unlit = lights.iter().map(|named| unlit(&named.light, &receivers));
+    let unlit: Vec<_> = unlit.collect();
     let shading = add_shading(
         graph,
         &ShadingInputs {
@@ -271,6 +277,7 @@ fn shaded<'f>(
             params: found.params,
             parts: &found.parts,
             ambient: Ambient::of(lights, scene.bounds()),
+            unlit: &unlit,
         },
     );
     Frame {

@@ -79,6 +79,8 @@ pub struct ShadingInputs<'a> {
     pub parts: &'a [BufferPart],
     /// Light from nowhere in particular.
     pub ambient: Ambient,
+    /// For each light, why nothing in view gets any of it, if so; lights beyond the list may light all.
+    pub unlit: &'a [Option<&'static str>],
 }
 
 /// Images that shading makes, of the picture's size.
@@ -138,6 +140,10 @@ pub fn add_shading(graph: &mut Graph<'_>, inputs: &ShadingInputs<'_>) -> Shading
 
     let shiny = u32::from(inputs.scene.is_shiny());
     for (index, named) in inputs.lights.iter().enumerate() {
+        if let Some(reason) = inputs.unlit.get(index).copied().flatten() {
+            graph.skip(format!("shade.light {}", named.name), reason);
+            continue;
+        }
         let (params, part) = (inputs.params, inputs.parts[index]);
         let mask = inputs.masks[index].visibility;
         let shape = shape_number(&named.light.shape);

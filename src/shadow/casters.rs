@@ -18,7 +18,8 @@ pub fn casters(light: &AreaLight, receivers: &[Vec<DVec3>], scene: &SceneBuffers
 /// For each box (eight corners in scene space, metres, x changing fastest, then y) whether what is in
 /// it can block any part of the light from any point of the receivers' convex hulls. It cannot where
 /// the light and all receivers lie on the outer side of a face of the box: neither does flat ground
-/// shadow itself or what stands on it, nor a wall the room that it closes.
+/// shadow itself or what stands on it, nor a wall the room that it closes. And nothing can where there
+/// are no receivers, or all are behind the light.
 ///
 /// Never wrong about what it rules out; what it leaves may still block nothing.
 pub(super) fn can_block(
@@ -26,6 +27,9 @@ pub(super) fn can_block(
     receivers: &[Vec<DVec3>],
     boxes: &[[Vec3; 8]],
 ) -> Vec<bool> {
+    if !receivers.iter().any(|hull| is_before(light, hull)) {
+        return vec![false; boxes.len()];
+    }
     let largest = |corners: &[Vec3; 8]| {
         corners
             .iter()
@@ -47,6 +51,12 @@ pub(super) fn can_block(
             })
         })
         .collect()
+}
+
+/// Whether any point of a hull is where the light shines: a disk or rectangle gives none behind its plane.
+pub(crate) fn is_before(light: &AreaLight, hull: &[DVec3]) -> bool {
+    let front = |p: &DVec3| (*p - light.center.as_dvec3()).dot(light.direction.as_dvec3()) > 0.0;
+    !light.shape.is_one_sided() || hull.iter().any(front)
 }
 
 /// Outward normals of a box's faces, and the offsets of their planes; of a flat box, both sides.
@@ -131,6 +141,21 @@ mod tests {
         let disk = light(LightShape::Disk { radius: 2.0 }, [0.0, 4.0, 0.0]);
         let with_cellar = [hull(&ground), hull(&cellar)];
         assert_eq!(can_block(&disk, &with_cellar, &[ground]), [true]);
+    }
+
+    #[test]
+    fn nothing_blocks_for_nobody() {
+        let body = boxed([-1.0, 1.0, -1.0], [1.0, 2.0, 1.0]);
+        let disk = light(LightShape::Disk { radius: 2.0 }, [0.0, 4.0, 0.0]);
+        let block =
+            |light: &AreaLight, receivers: &[Vec<DVec3>]| can_block(light, receivers, &[body]);
+        assert_eq!(block(&disk, &[hull(&body)]), [true]);
+        assert_eq!(block(&disk, &[]), [false]);
+        let above = hull(&boxed([-1.0, 5.0, -1.0], [1.0, 6.0, 1.0]));
+        assert_eq!(block(&disk, std::slice::from_ref(&above)), [false]);
+        // A sphere shines there too.
+        let sphere = light(LightShape::Sphere { radius: 2.5 }, [0.0, 4.0, 0.0]);
+        assert_eq!(block(&sphere, &[above]), [true]);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Views from a light's centre that together look at every receiver.
 
+use super::casters::is_before;
 use crate::light::AreaLight;
 use crate::scene::Aabb;
 use bytemuck::{Pod, Zeroable};
@@ -57,8 +58,7 @@ pub fn light_views(
     margin: f64,
 ) -> LightViews {
     // A disk or rectangle gives no light behind its plane, so nobody there asks what blocks it.
-    let front = |p: &DVec3| (*p - light.center.as_dvec3()).dot(light.direction.as_dvec3()) > 0.0;
-    let counts = |hull: &&Vec<DVec3>| !light.shape.is_one_sided() || hull.iter().any(front);
+    let counts = |hull: &&Vec<DVec3>| is_before(light, hull);
     let receivers: Vec<&Vec<DVec3>> = receivers.iter().filter(counts).collect();
     let points: Vec<DVec3> = receivers.iter().copied().flatten().copied().collect();
     let mut views = LightViews {

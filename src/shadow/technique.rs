@@ -10,9 +10,10 @@ use super::oess::{self, OessOptions};
 use super::pcss::PcssOptions;
 use super::shaft_masks::{self, ShaftOptions};
 use super::ssoc::{self, SsocOptions};
+use super::unblocked::{add_unblocked, why_unblocked};
 use super::{ShadowInputs, ShadowMask, hard, pcss};
 use crate::graph::Graph;
-use crate::light::{AreaLight, ShapeKind};
+use crate::light::{AreaLight, LightShape, ShapeKind};
 use std::collections::BTreeMap;
 
 /// How visibility is found.
@@ -408,8 +409,29 @@ impl Technique {
         }
     }
 
+    /// The shape that a light counts as where nothing can block it, if then the technique needs none of
+    /// its passes: what is left is the receivers' own horizon.
+    fn unblocked_shape(self, light: &AreaLight) -> Option<LightShape> {
+        match self {
+            Self::Hard => Some(LightShape::Point),
+            Self::Pcf(_) | Self::Pcss(_) | Self::OcclusionTextures(_) => Some(light.shape),
+            // What of an uneven light is above a horizon takes rays.
+            Self::Mdi(_) => (!light.is_uneven()).then_some(light.shape),
+            Self::Ssoc(options) => (!options.falloff).then_some(light.shape),
+            Self::Dbuffer(options) => options.unblocked_shape(light),
+            Self::Oess(_) | Self::ShaftMasks(_) => None,
+            // The technique that is chosen says.
+            Self::Auto(_) => None,
+        }
+    }
+
     /// Declares the passes that make one light's visibility.
     pub fn add_passes<'f>(self, graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -> ShadowMask {
+        if let Some(shape) = self.unblocked_shape(&inputs.light)
+            && let Some(reason) = why_unblocked(inputs)
+        {
+            return ShadowMask::new(add_unblocked(graph, inputs, self.name(), shape, reason));
+        }
         match self {
             Self::Hard => hard::add_passes(graph, inputs),
             Self::OcclusionTextures(options) => {

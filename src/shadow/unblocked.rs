@@ -1,45 +1,63 @@
 //! Visibility where nothing can block a light: what is above each surface's own horizon.
 
-use super::receivers::add_receivers;
+use super::casters::is_before;
 use super::{ShadowInputs, shape_number};
-use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, Graph, ImageId, PassKind, Stage};
+use crate::gpu::{GraphicsPipelineDesc, SamplerDesc, spirv};
+use crate::graph::{Access, Bind, Graph, ImageDesc, ImageId, Load, PassKind, Stage};
+use crate::light::LightShape;
+use ash::vk;
 
-/// Declares the passes; returns the R32F image of visibility.
+/// Why nothing can block a light; `None` if something may.
+pub(super) fn why_unblocked(inputs: &ShadowInputs<'_>) -> Option<&'static str> {
+    if inputs.casters.contains(&true) {
+        return None;
+    }
+    let before = |hull: &Vec<_>| is_before(&inputs.light, hull);
+    Some(if inputs.receivers.is_empty() {
+        "no surface is in view"
+    } else if !inputs.receivers.iter().any(before) {
+        "all that is in view is behind the light"
+    } else {
+        "nothing can stand between the light and what is in view"
+    })
+}
+
+/// Declares the pass that takes the place of a technique's, of a light of that shape, and notes why;
+/// returns the R32F image of visibility.
 pub(super) fn add_unblocked(
     graph: &mut Graph<'_>,
     inputs: &ShadowInputs<'_>,
     technique: &str,
+    shape: LightShape,
+    reason: &str,
 ) -> ImageId {
-    let receivers = add_receivers(graph, inputs, technique, inputs.light.shape.reach());
-    let list = receivers.list;
+    graph.skip(format!("{technique} {}", inputs.light_name), reason);
     let gbuffer = inputs.gbuffer;
     let (view_params, part) = inputs.view_params;
+    let [width, height] = inputs.camera.size();
+    let desc = ImageDesc::new(vk::Format::R32_SFLOAT, width, height);
+    let visibility = graph.create_image(format!("visibility {}", inputs.light_name), desc);
     let name = format!("{technique}.unblocked {}", inputs.light_name);
-    let mut pass = graph.pass(name, PassKind::Compute);
-    pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+    // Tiles would cost more than they save.
+    let mut pass = graph.pass(name, PassKind::Graphics);
+    pass.read_part(view_params, part, Access::Uniform(Stage::Fragment));
     for image in [gbuffer.view_depth, gbuffer.geometric_normal] {
-        pass.read(image, Access::Sampled(Stage::Compute));
+        pass.read(image, Access::Sampled(Stage::Fragment));
     }
-    list.read(&mut pass);
-    let visibility = pass.write(receivers.visibility, Access::StorageWrite(Stage::Compute));
-    let constants = vec![(0, shape_number(&inputs.light.shape))];
+    let visibility = pass.color(visibility, Load::Discard);
     pass.record(move |ctx| {
         let nearest = SamplerDesc::nearest();
         let bindings = [
             Bind::uniform(0, view_params).part(part),
             Bind::sampled(1, gbuffer.view_depth, nearest),
             Bind::sampled(2, gbuffer.geometric_normal, nearest),
-            Bind::uniform(3, list.arguments),
-            Bind::sampled(4, list.tiles, nearest),
-            Bind::storage_image(5, visibility),
         ];
-        let pipeline = ComputePipelineDesc {
-            constants,
-            ..ComputePipelineDesc::new(&spirv::SHADOW_UNBLOCKED_COMP)
-        };
-        ctx.bind_compute(&pipeline, &bindings, &[])?;
-        list.dispatch(ctx)
+        let fragment = Some(&spirv::SHADOW_UNBLOCKED_FRAG);
+        let mut pipeline = GraphicsPipelineDesc::new(&spirv::SCREEN_FULLSCREEN_VERT, fragment);
+        pipeline.constants = vec![(0, shape_number(&shape))];
+        ctx.bind_graphics(pipeline, &bindings, &[])?;
+        ctx.draw(0, 3, 1);
+        Ok(())
     });
     visibility
 }

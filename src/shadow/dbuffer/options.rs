@@ -1,5 +1,6 @@
 //! Options of `dbuffer`.
 
+use crate::light::{AreaLight, LightShape};
 use crate::shadow::TechniqueOption;
 
 /// What a receiver takes the edges that matter to it from.
@@ -175,6 +176,11 @@ impl DbufferOptions {
     }
 
     /// Sets one; `None` for a value that it does not take.
+    /// What a light counts as where nothing blocks it; `None` where that takes the technique's passes.
+    pub(in crate::shadow) fn unblocked_shape(&self, light: &AreaLight) -> Option<LightShape> {
+        (self.buffer == Buffer::Lists && !self.as_disk).then_some(light.shape)
+    }
+
     pub(in crate::shadow) fn set(&mut self, option: &str, value: &str) -> Option<()> {
         let number = value.parse::<u32>().ok();
         match option {

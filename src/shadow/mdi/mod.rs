@@ -33,7 +33,6 @@ mod views;
 pub use options::{Buckets, Footprint, MdiOptions};
 
 use super::receivers::add_receivers;
-use super::unblocked::add_unblocked;
 use super::{ShadowInputs, ShadowMask, Tally, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, Graph, PassKind, Stage};
@@ -52,9 +51,6 @@ pub(super) fn add_passes<'f>(
     let draws = inputs.scene.draws();
     let light = &inputs.light;
     let none = !inputs.casters.contains(&true);
-    if none && !light.is_uneven() {
-        return ShadowMask::new(add_unblocked(graph, inputs, NAME));
-    }
     // What of an uneven light is above a horizon takes rays, and rays a view.
     let mut blocks: Vec<_> = inputs
         .casters

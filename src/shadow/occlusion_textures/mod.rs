@@ -64,7 +64,8 @@ pub(super) fn add_passes<'f>(
     };
     let views = views::sliced_views(&inputs.light, &inputs.receivers, &casters, &options);
     if views.is_empty() {
-        return ShadowMask::new(add_unblocked(graph, inputs, NAME));
+        let (shape, reason) = (inputs.light.shape, "no caster is in any slice");
+        return ShadowMask::new(add_unblocked(graph, inputs, NAME, shape, reason));
     }
     let sliced: Vec<_> = views
         .into_iter()

@@ -1,0 +1,299 @@
+//! What a frame does not need is not run, not allocated, not compiled; the plan says why; and the picture is
+//! the same, bit for bit.
+#![cfg(feature = "cli")]
+
+mod support;
+
+use antumbra::capture::{CapturedFrame, FrameRenderer, FrameRequest, plan_frame};
+use antumbra::graph::{FakeMemory, Graph, Plan};
+use antumbra::light::{AreaLight, LightShape};
+use antumbra::renderer::{NamedLight, SceneBuffers, add_frame};
+use antumbra::scene::{Primitive, Scene};
+use glam::Vec3;
+use support::plates::{SIZE, camera, floor, plate, scene};
+use support::rig::with_renderer;
+
+/// Techniques that have nothing to do where nothing blocks, each with a light that it can do.
+const TECHNIQUES: [&str; 7] = [
+    "hard",
+    "pcf",
+    "pcss",
+    "occlusion-textures",
+    "mdi",
+    "ssoc",
+    "dbuffer",
+];
+const DISK: LightShape = LightShape::Disk { radius: 0.5 };
+
+fn request(technique: &str) -> FrameRequest {
+    FrameRequest {
+        camera: camera(),
+        size: [SIZE; 2],
+        lights: vec![0],
+        technique: technique.parse().unwrap(),
+    }
+}
+
+/// Two plates in one mesh, far to both sides: the box around them stands before the light, they do not.
+fn beside() -> Primitive {
+    let mut both = plate("beside", [-20.0, -19.0], [-1.0, 1.0], 5.0);
+    let other = plate("beside", [19.0, 20.0], [-1.0, 1.0], 5.0);
+    both.positions.extend(other.positions);
+    both.normals.extend(other.normals);
+    both.indices
+        .extend(other.indices.iter().map(|index| index + 4));
+    both
+}
+
+fn floor_under(shape: LightShape) -> Scene {
+    scene(vec![floor()], shape)
+}
+
+/// Passes of a light's visibility, without the technique's and the light's name.
+fn passes(frame: &CapturedFrame, technique: &str) -> Vec<String> {
+    let names = frame.lights[0].passes.iter();
+    names
+        .map(|name| {
+            let name = name.strip_prefix(technique).unwrap_or(name);
+            name.split(' ').next().unwrap_or_default().to_owned()
+        })
+        .collect()
+}
+
+#[track_caller]
+fn assert_reason(plan: &Plan, name: &str, reason: &str) {
+    let found = plan.culled.iter().find(|pass| pass.name.starts_with(name));
+    assert!(
+        found.is_some_and(|pass| pass.reason.contains(reason)),
+        "{name}, {reason}: {:?}",
+        plan.culled
+    );
+}
+
+#[test]
+fn nothing_that_blocks_takes_no_technique() {
+    let _one = support::serial();
+    let beside = scene(vec![floor(), beside()], DISK);
+    for technique in TECHNIQUES {
+        let request = request(technique);
+        let full = with_renderer(&beside, |renderer| renderer.render(&request).unwrap());
+        let frame = with_renderer(&floor_under(DISK), |renderer| {
+            renderer.render(&request).unwrap()
+        });
+        assert_eq!(passes(&frame, technique), [".unblocked"]);
+        assert_reason(&frame.plan, technique, "nothing can stand between");
+        // Its slices hold what stands before the receivers.
+        let sliced = technique == "occlusion-textures";
+        assert_eq!(full.lights[0].passes.len() > 3, !sliced, "{technique}");
+        // Another scene, of which the floor is the same: other ambient light, the same visibility.
+        assert!(
+            frame.lights[0].visibility == full.lights[0].visibility,
+            "{technique}"
+        );
+        assert!(frame.lights[0].visibility.iter().all(|v| *v == 1.0));
+        let bytes = |frame: &CapturedFrame| frame.counters["transient_bytes"];
+        assert!(sliced || bytes(&frame) * 4 < bytes(&full), "{technique}");
+    }
+}
+
+/// Lights of every shape, and the floor from above, lit, and from below, dark.
+#[test]
+fn both_sides_of_a_floor_are_the_same_without_the_technique() {
+    let _one = support::serial();
+    let shapes = [
+        LightShape::Point,
+        LightShape::Sphere { radius: 0.5 },
+        LightShape::Sun {
+            angular_diameter: 0.3,
+        },
+        LightShape::Rect {
+            width: 1.0,
+            height: 0.5,
+        },
+        LightShape::Line { length: 1.0 },
+    ];
+    for shape in shapes {
+        let alone = floor_under(shape);
+        let beside = scene(vec![floor(), beside()], shape);
+        for technique in TECHNIQUES {
+            let mut request = request(technique);
+            if (request.technique.check(&alone.lights[0].light)).is_err() {
+                continue;
+            }
+            for expected in [1.0, 0.0] {
+                let title = format!("{technique} {shape:?} {expected}");
+                let [few, full] = [&alone, &beside].map(|scene| {
+                    with_renderer(scene, |renderer| renderer.render(&request).unwrap())
+                });
+                assert_eq!(passes(&few, technique).len(), 1, "{title}");
+                assert!(
+                    few.lights[0].visibility == full.lights[0].visibility,
+                    "{title}"
+                );
+                assert!(
+                    few.lights[0].visibility.iter().all(|v| *v == expected),
+                    "{title}"
+                );
+                request.camera.position.y = -2.0;
+                (request.camera.forward, request.camera.up) = (Vec3::Y, Vec3::Z);
+            }
+        }
+    }
+}
+
+/// A light that shines away, and a camera that looks away.
+#[test]
+fn no_receiver_takes_no_technique() {
+    let _one = support::serial();
+    let blocked = vec![floor(), plate("blocker", [-2.0, 0.0], [-2.0, 2.0], 5.0)];
+    let mut away = scene(blocked.clone(), DISK);
+    away.lights[0].light.direction = Vec3::Y;
+    let mut up = camera();
+    (up.forward, up.up) = (Vec3::Y, Vec3::Z);
+    for technique in TECHNIQUES {
+        let mut request = request(technique);
+        let dark = with_renderer(&away, |renderer| renderer.render(&request).unwrap());
+        assert_eq!(passes(&dark, technique).len(), 1, "{technique}");
+        assert_reason(&dark.plan, technique, "behind the light");
+        assert_reason(&dark.plan, "shade.light", "behind it");
+
+        request.camera = up.clone();
+        request.camera.position.y = 7.0;
+        let lit = scene(blocked.clone(), DISK);
+        let empty = with_renderer(&lit, |renderer| renderer.render(&request).unwrap());
+        assert_eq!(passes(&empty, technique).len(), 1, "{technique}");
+        assert_reason(&empty.plan, technique, "in view");
+        assert!(empty.lights[0].visibility.iter().all(|v| *v == 1.0));
+    }
+}
+
+/// What a light without light makes of a picture, and of a frame of which nobody reads the visibility.
+#[test]
+fn a_light_that_lights_nothing_is_not_shaded() {
+    let _one = support::serial();
+    let blocked = vec![floor(), plate("blocker", [-2.0, 0.0], [-2.0, 2.0], 5.0)];
+    let mut lit = scene(blocked, DISK);
+    // A second light gives the picture its brightness.
+    let mut other = lit.lights[0].clone();
+    other.light.center.x = 3.0;
+    lit.lights.push(other);
+    type Change = fn(&mut AreaLight);
+    let changes: [(&str, Change); 3] = [
+        ("intensity", |light| light.intensity = 0.0),
+        ("range", |light| light.range = Some(1.0)),
+        ("behind", |light| light.direction = Vec3::Y),
+    ];
+    for (reason, change) in changes {
+        let mut scene = lit.clone();
+        change(&mut scene.lights[0].light);
+        let mut both = request("pcss");
+        both.lights = vec![0, 1];
+        let frame = with_renderer(&scene, |renderer| renderer.render(&both).unwrap());
+        assert_reason(&frame.plan, "shade.light 0", reason);
+        let shaded = |name: &String| name.starts_with("shade.light");
+        assert_eq!(
+            frame
+                .report
+                .passes
+                .iter()
+                .filter(|name| shaded(name))
+                .count(),
+            1
+        );
+
+        // Of the same light almost in reach everything is done, and the picture is the same: what it adds
+        // is lost in rounding.
+        let mut faint = scene.clone();
+        faint.lights[0].light = lit.lights[0].light;
+        faint.lights[0].light.intensity = 1.0e-30;
+        let done = with_renderer(&faint, |renderer| renderer.render(&both).unwrap());
+        assert_eq!(
+            done.report
+                .passes
+                .iter()
+                .filter(|name| shaded(name))
+                .count(),
+            2
+        );
+        if reason == "intensity" {
+            assert!(frame.color == done.color);
+        }
+
+        // A host that wants the picture alone has no pass of the light's.
+        let buffers = SceneBuffers::plan_only(&scene, false);
+        let lights: Vec<NamedLight> = (scene.lights.iter().enumerate())
+            .map(|(index, found)| NamedLight {
+                name: index.to_string(),
+                light: found.light,
+            })
+            .collect();
+        let mut graph = Graph::new();
+        let technique = "pcss".parse().unwrap();
+        let frame = add_frame(
+            &mut graph,
+            &buffers,
+            &camera(),
+            [SIZE; 2],
+            &lights,
+            technique,
+        );
+        graph.keep(frame.radiance);
+        let compiled = graph.compile(&FakeMemory).unwrap();
+        let plan = compiled.plan();
+        let of = |light: &str| {
+            let names = plan.passes.iter().map(|pass| pass.name.as_ref());
+            let own = format!(" {light}");
+            names
+                .filter(|name| name.starts_with("pcss") && name.contains(&own))
+                .count()
+        };
+        assert_eq!(of("0"), 0, "{reason}: {plan}");
+        assert!(of("1") >= 4, "{reason}: {plan}");
+    }
+}
+
+/// Pipelines are made for what runs, and only then.
+#[test]
+fn pipelines_of_what_is_not_needed_are_not_made() {
+    let _one = support::serial();
+    let made = |technique: &str, scene: &Scene| {
+        let mut renderer = FrameRenderer::owning(support::gpu(), scene.clone()).unwrap();
+        let request = request(technique);
+        let first = renderer.render(&request).unwrap().counters["pipelines_created"];
+        let second = renderer.render(&request).unwrap().counters["pipelines_created"];
+        assert_eq!(second, 0, "{technique}");
+        support::assert_no_messages(&renderer.destroy().unwrap());
+        first
+    };
+    let bare = floor_under(DISK);
+    let blocker = plate("blocker", [-2.0, 0.0], [-2.0, 2.0], 5.0);
+    let blocked = scene(vec![floor(), blocker], DISK);
+    let least = made("pcss", &bare);
+    for technique in ["ssoc", "dbuffer"] {
+        assert_eq!(made(technique, &bare), least, "{technique}");
+    }
+    // Tiles and their bounds, the map, and the filter in place of the pass of horizons.
+    assert_eq!(made("pcss", &blocked), least + 3);
+}
+
+/// Tallies that nobody asked for, and the reason why they are left out, in the plan that `antumbra graph`
+/// prints.
+#[test]
+fn passes_that_nobody_reads_are_left_out() {
+    let blocker = plate("blocker", [-2.0, 0.0], [-2.0, 2.0], 5.0);
+    let blocked = scene(vec![floor(), blocker], DISK);
+    let plan = plan_frame(&blocked, &request("ssoc")).unwrap();
+    assert_reason(&plan, "ssoc.crowding", "nobody reads");
+    assert_reason(&plan, "ssoc.collisions", "nobody reads");
+    let text = plan.to_string();
+    assert!(
+        text.contains("culled") && text.contains("nobody reads"),
+        "{text}"
+    );
+    let plan = plan_frame(&floor_under(DISK), &request("ssoc")).unwrap();
+    let json = plan.to_json().to_string();
+    assert!(
+        json.contains("nothing can stand between the light"),
+        "{json}"
+    );
+}

@@ -140,27 +140,31 @@ fn a_light_that_is_not_even() {
             let [a, b] = [profile.values()[cell], profile.values()[cell + 1]];
             a + (b - a) * (at - cell as f32)
         };
-        for segments in [1, 3] {
+        for technique in [
+            "oess",
+            "oess:outreach=hull,segments=1",
+            "oess:outreach=hull,segments=3",
+        ] {
             let mut scene = scene(primitives.clone(), line(LENGTH));
             scene.lights[0].light.profile = profile;
-            let technique = format!("oess:segments={segments}");
-            let image = frame(&scene, &camera(), &technique, &[]).visibility;
+            let image = frame(&scene, &camera(), technique, &[]).visibility;
             let errors = (0..SIZE as usize).map(|column| {
                 let wanted = truth(floor_x(column as u32), HEIGHT, &blockers, bright);
                 (image[column + (SIZE * SIZE / 2) as usize] - wanted).abs()
             });
             let worst = errors.fold(0.0, f32::max);
-            println!("{text}, {segments} segments: {worst}");
-            assert!(worst <= 0.006, "{text}, {segments} segments: {worst}");
+            println!("{text}, {technique}: {worst}");
+            assert!(worst <= 0.006, "{text}, {technique}: {worst}");
         }
     }
 }
 
-/// The camera sees a few centimetres of the floor, as wide as the penumbra.
+/// Where a half-plane's edge divides the line, in 32 bits on the device against 64 here; the camera sees a few
+/// centimetres of the floor, as wide as the penumbra.
 #[test]
 fn short_lines_are_as_exact_as_long_ones() {
     let _one = support::serial();
-    for part in [1.0e-3, 1.0e-2] {
+    for part in [1.0e-3, 1.0e-2, 0.2] {
         let length = part * HEIGHT;
         let blocker = plate("blocker", [-30.0, 0.0], [-30.0, 30.0], 5.0);
         let scene = scene(vec![floor(), blocker], line(length));
@@ -168,15 +172,21 @@ fn short_lines_are_as_exact_as_long_ones() {
             yfov: 2.0 * (0.8 * length / 2.0).atan(),
             ..camera()
         };
-        let image = frame(&scene, &close, "oess", &[]).visibility;
-        let mut worst = 0.0_f32;
-        for column in 0..SIZE {
-            let x = 0.5 * floor_x(column) * length;
-            let wanted = (0.5 + x / length).clamp(0.0, 1.0);
-            worst = worst.max((image[(column + SIZE * SIZE / 2) as usize] - wanted).abs());
+        for (technique, most) in [("oess", 1.0e-3), ("oess:outreach=hull", 0.005)] {
+            let image = frame(&scene, &close, technique, &[]).visibility;
+            let errors = (0..SIZE).map(|column| {
+                let x = 0.8 * ((f64::from(column) + 0.5) / f64::from(SIZE / 2) - 1.0);
+                let wanted = (0.5 + x).clamp(0.0, 1.0);
+                let at = (column + SIZE * SIZE / 2) as usize;
+                (f64::from(image[at]) - wanted).abs()
+            });
+            let worst = errors.fold(0.0, f64::max);
+            println!("length {part} of the distance, {technique}: {worst}");
+            assert!(
+                worst <= most,
+                "length {part} of the distance, {technique}: {worst}"
+            );
         }
-        println!("length {part} of the distance: {worst}");
-        assert!(worst <= 0.005, "length {part} of the distance: {worst}");
     }
 }
 
@@ -200,7 +210,12 @@ fn penumbrae_do_not_go_through_receivers() {
     let published = worst("oess:outreach=scatter,penumbra=place");
     println!("by place {published}");
     assert!(published > 0.1, "{published}");
-    for technique in ["oess", "oess:outreach=scatter", "oess:outreach=scan"] {
+    for technique in [
+        "oess",
+        "oess:outreach=hull",
+        "oess:outreach=scatter",
+        "oess:outreach=scan",
+    ] {
         let error = worst(technique);
         println!("{technique}: {error}");
         assert!(error <= 0.005, "{technique}: {error}");
@@ -263,10 +278,10 @@ fn segments_are_looked_at_where_something_hides_between_the_ends() {
     for (name, blockers, open) in [("half-plane", &half_plane[..], 0), ("slats", &SLATS, 1000)] {
         let scene = lines(blockers, LENGTH);
         let names = ["oess.open 0:lamp"];
-        let found = frame(&scene, &camera(), "oess", &names);
+        let found = frame(&scene, &camera(), "oess:outreach=hull", &names);
         let opened = found.images[0].iter().filter(|part| **part != 0).count();
         let error = worst(&found.visibility, blockers);
-        let ends = frame(&scene, &camera(), "oess:segments=1", &[]).visibility;
+        let ends = frame(&scene, &camera(), "oess:outreach=hull,segments=1", &[]).visibility;
         let by_ends = worst(&ends, blockers);
         println!("{name}: {opened} open, error {error}; by ends alone {by_ends}");
         assert!(error <= 0.002, "{name}: {error}");
@@ -285,7 +300,7 @@ fn segments_are_looked_at_where_something_hides_between_the_ends() {
             camera: camera(),
             size: [SIZE; 2],
             lights: vec![0],
-            technique: "oess".parse().unwrap(),
+            technique: "oess:outreach=hull".parse().unwrap(),
         };
         let frame =
             support::rig::with_renderer(&scene, |renderer| renderer.render(&request).unwrap());

@@ -142,7 +142,7 @@ Crossing crossing_at_edge(CoverageReceiver r, uvec2 stored, bool umbra) {
     // Seen from here the edge is no outline; or its volume is closed around its end, where the light's centre is
     // free, for receivers off a corner.
     bool at_end = !umbra && (part <= 0.0 || part >= 1.0);
-    found.is_weak = at_end || faces_on_one_side(r, edge, world_a, world_b) == 0.0;
+    found.is_weak = at_end || faces_on_one_side(r.p, r.turn, edge, world_a, world_b) == 0.0;
     float off = length(found.nearest);
     vec2 way = off > 0.0 ? found.nearest / off : vec2(-along.y, along.x) * inversesqrt(max(square, 1.0e-30));
     found.open = umbra ? way : -way;

@@ -17,7 +17,7 @@
 
 #include "common/light_above.glsl"
 #include "dbuffer/params.glsl"
-#include "silhouettes/edges.glsl"
+#include "silhouettes/sides.glsl"
 
 layout(constant_id = 0) const uint LIGHT_SHAPE = 0u;
 // Light samples, in fours.
@@ -93,54 +93,6 @@ CoverageReceiver coverage_receiver(Light light, vec3 p, vec3 n, float rounding_m
 // From the receiver to a place on the light.
 vec3 to_light_place(CoverageReceiver r, vec2 place) {
     return r.center + place.x * r.axis_u + place.y * r.axis_v;
-}
-
-// Whether a triangle's plane has the receiver on its front or back: the sign of the volume that it spans with
-// it. Its sides are differences of the stored positions, which stay exact where it is small and far away.
-// A receiver in the plane counts as if moved from it a little, by the same way for all planes: so triangles
-// of one plane agree, and the edges between them, which are silhouettes of nothing, do not count.
-float side_of_plane(vec3 one, vec3 two, vec3 three, vec3 p) {
-    precise vec3 from = one - p;
-    precise vec3 first = two - one;
-    precise vec3 second = three - one;
-    precise float nx = first.y * second.z - first.z * second.y;
-    precise float ny = first.z * second.x - first.x * second.z;
-    precise float nz = first.x * second.y - first.y * second.x;
-    precise float sum = from.x * nx + from.y * ny + from.z * nz;
-    float side = sum != 0.0 ? sum : (nx != 0.0 ? nx : (ny != 0.0 ? ny : nz));
-    return side >= 0.0 ? 1.0 : -1.0;
-}
-
-// 1 where the third point's face lies where the determinant with the first two is positive, else -1: a
-// face seen edge-on counts as one or the other, for all of its edges alike. a and b: scene space.
-float side_of_face(CoverageReceiver r, uint ia, vec3 a, uint ib, vec3 b, uint corner) {
-    vec3 c = fetch_point(corner).xyz;
-    // Ends of an edge are in the order of their numbers.
-    bool first = corner < ia;
-    bool last = corner > ib;
-    vec3 one = first ? c : a;
-    vec3 two = first ? a : (last ? b : c);
-    vec3 three = last ? c : b;
-    float sign_of = side_of_plane(one, two, three, r.p) * r.turn;
-    return first || last ? sign_of : -sign_of;
-}
-
-float faces_on_one_side(CoverageReceiver r, uvec4 edge, vec3 a, vec3 b) {
-    float sum = side_of_face(r, edge.x, a, edge.y, b, edge.z);
-    if (edge.w < MORE_FACES) {
-        sum += side_of_face(r, edge.x, a, edge.y, b, edge.w);
-    } else if (edge.w != NO_POINT) {
-        uint place = edge.w & ~MORE_FACES;
-        uvec4 more;
-        do {
-            more = fetch_edge(place);
-            for (uint i = 0u; i < more.w >> 1; ++i) {
-                sum += side_of_face(r, edge.x, a, edge.y, b, more[i]);
-            }
-            place += 1u;
-        } while ((more.w & 1u) != 0u);
-    }
-    return sum;
 }
 
 // Cuts the range of an edge where a linear function of it is positive.
@@ -281,7 +233,7 @@ void add_edge(CoverageReceiver r, uint number, inout Coverage found) {
     if (piece.x >= piece.y) {
         return;
     }
-    float faces = faces_on_one_side(r, edge, world_a, world_b);
+    float faces = faces_on_one_side(r.p, r.turn, edge, world_a, world_b);
     if (faces == 0.0) {
         return;
     }

@@ -91,6 +91,15 @@ bool cuts_flat(vec3 a, vec3 b, vec3 c) {
     return max(max(first.x, first.y), 0.0) < min(min(last.x, last.y), 1.0);
 }
 
+// Whether a line, from -1 to 1 along x, passes through a triangle.
+bool cuts_line(vec3 a, vec3 b, vec3 c) {
+    vec3 sides = vec3(b.y * c.z - b.z * c.y, c.y * a.z - c.z * a.y, a.y * b.z - a.z * b.y);
+    bool inside = all(greaterThanEqual(sides, vec3(0.0))) || all(lessThanEqual(sides, vec3(0.0)));
+    float sum = sides.x + sides.y + sides.z;
+    float at = dot(sides, vec3(a.x, b.x, c.x)) / sum;
+    return inside && sum != 0.0 && abs(at) < 1.0 - TOUCHING;
+}
+
 void main() {
     vec3 center = view.light.center.xyz;
     vec3 x = view.light.axis_x.xyz;
@@ -98,7 +107,8 @@ void main() {
     vec3 z = view.light.direction.xyz;
     vec2 size = max(vec2(view.light.axis_x.w, view.light.axis_y.w), 1.0e-30);
     float least = min(size.x, size.y);
-    vec3 reach = LIGHT_SHAPE == LIGHT_SPHERE ? vec3(size.x) : abs(x) * size.x + abs(y) * size.y;
+    vec3 reach = LIGHT_SHAPE == LIGHT_SPHERE ? vec3(size.x)
+        : abs(x) * size.x + (LIGHT_SHAPE == LIGHT_LINE ? vec3(0.0) : abs(y) * size.y);
     bool cut = false;
     uint node = 0u;
     uint steps = 0u;
@@ -118,9 +128,13 @@ void main() {
                     ? q
                     : vec3(dot(q, x) / size.x, dot(q, y) / size.y, dot(q, z) / least);
             }
-            cut = LIGHT_SHAPE == LIGHT_SPHERE
-                ? cuts_ball(corners[0], corners[1], corners[2], size.x)
-                : cuts_flat(corners[0], corners[1], corners[2]);
+            if (LIGHT_SHAPE == LIGHT_SPHERE) {
+                cut = cuts_ball(corners[0], corners[1], corners[2], size.x);
+            } else if (LIGHT_SHAPE == LIGHT_LINE) {
+                cut = cuts_line(corners[0], corners[1], corners[2]);
+            } else {
+                cut = cuts_flat(corners[0], corners[1], corners[2]);
+            }
         }
         node = next;
         steps += 1u;

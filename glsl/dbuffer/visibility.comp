@@ -4,7 +4,7 @@
 #include "common/light_above.glsl"
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
-#include "dbuffer/lists.glsl"
+#include "dbuffer/entries.glsl"
 #include "dbuffer/params.glsl"
 #include "dbuffer/through.glsl"
 
@@ -72,6 +72,14 @@ vec4 fetch_point_texel(ivec2 place) {
     return texelFetch(points, place, 0);
 }
 
+uint fetch_pool_texel(ivec2 place) {
+    return texelFetch(pool, place, 0).x;
+}
+
+uvec4 fetch_list_texel(ivec2 place) {
+    return texelFetch(lists, place, 0);
+}
+
 // What positions are rounded by, as a part of the largest coordinate that they are made from, the camera's
 // among them: a few units of the last place.
 const float POSITION_ROUNDING = 1.0 / 2097152.0;
@@ -93,56 +101,20 @@ vec4 above_plane(vec3 horizon, uint i) {
     return vec4(greaterThan(height, vec4(0.0)));
 }
 
-// Places of a list, one after the other: those in chunks first, then all that the list does not know.
-struct Entries {
-    uint chunk;
-    uint slot;
-    uint rest;
-    uint missing;
-    uint end;
-};
-
-Entries list_entries(uint block, uint tile, uint tiles) {
-    uvec4 stored = texelFetch(lists, list_place(block, tile, tiles), 0);
-    return Entries(stored.x, 0u, stored.y, stored.z, stored.w);
-}
-
-bool has_entries(Entries entries) {
-    return entries.rest > 0u || entries.missing < entries.end;
-}
-
 // Goes on to the next chunk whose box may matter; false at the end of the list. What the list does not know is a
 // chunk without a box.
 bool next_chunk(CoverageReceiver r, inout Entries entries) {
     bool found = false;
     while (!found && has_entries(entries)) {
-        bool listed = entries.rest > 0u;
-        if (listed && entries.slot == CHUNK) {
-            entries.chunk = texelFetch(pool, chunk_entry_place(entries.chunk, CHUNK), 0).x;
-            entries.slot = 0u;
-        }
+        bool listed = begin_chunk(entries);
         vec3 low = texelFetch(chunk_boxes, triangle_texel_place(2u * entries.chunk), 0).xyz;
         vec3 high = texelFetch(chunk_boxes, triangle_texel_place(2u * entries.chunk + 1u), 0).xyz;
         found = !listed || box_may_matter(r, low, high);
         if (!found) {
-            entries.rest -= min(entries.rest, CHUNK);
-            entries.slot = CHUNK;
+            skip_chunk(entries);
         }
     }
     return found;
-}
-
-// The next place in the chunk, and whether there are more in it.
-uint next_entry(inout Entries entries, out bool has_more) {
-    bool listed = entries.rest > 0u;
-    uint entry = listed
-        ? texelFetch(pool, chunk_entry_place(entries.chunk, entries.slot), 0).x
-        : entries.missing;
-    entries.slot += 1u;
-    entries.rest -= listed ? 1u : 0u;
-    entries.missing += listed ? 0u : 1u;
-    has_more = listed ? entries.slot < CHUNK && entries.rest > 0u : entries.missing < entries.end;
-    return entry;
 }
 
 // All of a tile's edges. Vector units walk through branches that none of their lanes takes: so each lane looks
@@ -170,16 +142,6 @@ void add_edges(uint tile, uint tiles, CoverageReceiver r, inout Coverage found) 
             }
         }
     }
-}
-
-// Edges that a receiver of the tile would look at.
-uint edges_of(uint tile, uint tiles) {
-    uint count = 0u;
-    for (uint block = 0u; block < params.sizes.x; ++block) {
-        uvec4 stored = texelFetch(lists, list_place(block, tile, tiles), 0);
-        count += stored.y + stored.w - stored.z;
-    }
-    return count;
 }
 
 // Triangles with holes that it would look at, or nodes in which they may be.
@@ -292,7 +254,7 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     CoverageReceiver r = coverage_receiver(view.light, p, n, rounding_m);
     vec3 horizon = vec3(dot(n, r.axis_u), dot(n, r.axis_v), dot(n, r.center));
     bool whole = above >= 1.0;
-    if (edges_of(tile, tiles) > params.sizes.z || (LIGHT_SHAPE != LIGHT_SUN && through.cut.x != 0u)) {
+    if (edges_of(tile, tiles, params.sizes.x) > params.sizes.z || (LIGHT_SHAPE != LIGHT_SUN && through.cut.x != 0u)) {
         return above * traced(r, horizon, whole);
     }
     bool center_above = horizon.z > 0.0;

@@ -6,6 +6,7 @@
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
 #include "oess/oess.glsl"
+#include "oess/profile.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -70,6 +71,14 @@ uint fetch_map_id(ivec2 texel, uint layer) {
     return texelFetch(map_ids, ivec3(texel, int(layer)), 0).x;
 }
 
+float profile_cells() {
+    return params.axis.w;
+}
+
+vec4 fetch_profile(uint cell) {
+    return params.profile[cell];
+}
+
 uint map_texels() {
     return params.counts.z;
 }
@@ -128,20 +137,6 @@ uint sector_of(vec3 p) {
         sector += found ? 0u : 1u;
     }
     return sector;
-}
-
-// Light before a place of the line, 0 to 1, and the same light times its place.
-vec2 light_before(float place) {
-    float cells = params.axis.w;
-    if (cells == 0.0) {
-        return vec2(place, 0.5 * place * place);
-    }
-    float cell = clamp(floor(place * cells), 0.0, cells - 1.0);
-    float x = place * cells - cell;
-    vec4 at = params.profile[uint(cell)];
-    float part = x * (at.x + 0.5 * x * at.y);
-    float moment = cell * part + x * x * (0.5 * at.x + x * at.y / 3.0);
-    return at.zw + vec2(part, moment / cells) / cells;
 }
 
 // Adds the part of the line between two of its places, 0 to 1: its light, and what of that counts for the

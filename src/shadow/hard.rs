@@ -37,6 +37,16 @@ pub(super) fn add_passes<'f>(graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -
     ShadowMask::new(add_hard(graph, inputs, "hard", image))
 }
 
+/// As `hard` does, with a map of another width and height in texels.
+pub(super) fn add_passes_at<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    texels: u32,
+) -> ShadowMask {
+    let image = format!("visibility {}", inputs.light_name);
+    ShadowMask::new(add_hard_at(graph, inputs, "hard", image, texels))
+}
+
 /// Declares the passes under another technique's name; returns the R32F image, of the given name, of
 /// what sees the light's centre: 1 or 0.
 pub(super) fn add_hard<'f>(
@@ -44,6 +54,17 @@ pub(super) fn add_hard<'f>(
     inputs: &ShadowInputs<'f>,
     technique: &str,
     image: String,
+) -> ImageId {
+    add_hard_at(graph, inputs, technique, image, MAP_SIZE)
+}
+
+/// As [`add_hard`], with the map's width and height in texels.
+pub(super) fn add_hard_at<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    technique: &str,
+    image: String,
+    texels: u32,
 ) -> ImageId {
     let name = &inputs.light_name;
     let light = inputs.light;
@@ -58,14 +79,14 @@ pub(super) fn add_hard<'f>(
         } else {
             light.center.extend(1.0).to_array()
         },
-        counts: [views.views.len() as u32, MAP_SIZE, width, height],
+        counts: [views.views.len() as u32, texels, width, height],
         views: Default::default(),
     };
     params.views[..views.views.len()].copy_from_slice(&views.views);
 
     let buffer = add_uniform(graph, format!("{technique}.params {name}"), params);
 
-    let maps = add_maps(graph, inputs, technique, &views, DrawTarget::Ids, MAP_SIZE);
+    let maps = add_maps(graph, inputs, technique, &views, DrawTarget::Ids, texels);
     let receivers = add_receivers_in(graph, inputs, technique, 0.0, image);
     let ShadowMap {
         depth: map_depth,

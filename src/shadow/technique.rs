@@ -6,7 +6,7 @@ use super::auto::{self, AutoOptions, Case, Table};
 use super::dbuffer::{self, DbufferOptions};
 use super::mdi::{self, MdiOptions};
 use super::occlusion_textures::{self, OcclusionOptions};
-use super::oess::{self, OessOptions};
+use super::oess::{self, OessOptions, Outreach};
 use super::pcss::PcssOptions;
 use super::shaft_masks::{self, ShaftOptions};
 use super::ssoc::{self, SsocOptions};
@@ -397,7 +397,11 @@ impl Technique {
     /// Whether it reads, or may read, the scene's edges
     /// ([`SceneBuffers::add_edges`](crate::renderer::SceneBuffers::add_edges)).
     pub fn reads_edges(self) -> bool {
-        matches!(self, Self::Ssoc(_) | Self::Dbuffer(_) | Self::Auto(_))
+        match self {
+            Self::Ssoc(_) | Self::Dbuffer(_) | Self::Auto(_) => true,
+            Self::Oess(options) => options.outreach == Outreach::Silhouettes,
+            _ => false,
+        }
     }
 
     /// What a light's counters ([`CapturedLight::counters`](crate::capture::CapturedLight::counters)) say

@@ -1,6 +1,6 @@
 //! The passes that find the edges of each tile.
 
-use super::{DbufferOptions, NAME};
+use super::DbufferOptions;
 use crate::geometry::{TileList, image_place, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
@@ -25,7 +25,7 @@ const LEAST_TILES: u32 = 1024;
 
 /// Sizes of what the device fills.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sizes {
+pub(in crate::shadow) struct Sizes {
     /// Edges of the scene: the most silhouettes that there can be.
     edges: u32,
     /// Blocks of silhouettes.
@@ -52,7 +52,9 @@ impl Sizes {
 }
 
 /// What the passes work on.
-pub(super) struct Lists {
+pub(in crate::shadow) struct Lists {
+    /// In names of passes and images.
+    pub technique: &'static str,
     pub params: BufferId,
     pub silhouettes: Silhouettes,
     pub receivers: Receivers,
@@ -72,7 +74,7 @@ struct Made {
 
 /// What they make.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
+pub(in crate::shadow) struct Found {
     /// R32_UINT: chunks of places in the list of silhouettes, and of numbers of triangles.
     pub pool: ImageId,
     /// RGBA32F: boxes around what chunks list, scene space, metres.
@@ -97,8 +99,9 @@ impl Lists {
     /// Declares the passes; returns the visibility image too, in which all but the found tiles are
     /// done.
     pub(super) fn add(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> (Found, ImageId) {
+        let technique = self.technique;
         let ends = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * self.sizes.edges);
-        let mut ends = graph.create_image(format!("{NAME}.ends {}", inputs.light_name), ends);
+        let mut ends = graph.create_image(format!("{technique}.ends {}", inputs.light_name), ends);
         let mut boxes: Vec<ImageId> = Vec::new();
         for (level, group) in GROUPS.into_iter().enumerate() {
             let below = level
@@ -122,14 +125,17 @@ impl Lists {
         below: Option<(ImageId, u32)>,
         ends: &mut ImageId,
     ) -> ImageId {
-        let name = &inputs.light_name;
+        let (technique, name) = (self.technique, &inputs.light_name);
         let count = self.sizes.edges.div_ceil(group);
         let desc = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * count);
-        let boxes = graph.create_image(format!("{NAME}.boxes {name}.{group}"), desc);
+        let boxes = graph.create_image(format!("{technique}.boxes {name}.{group}"), desc);
         let (edges, points) = (inputs.ids.edges, inputs.ids.points);
         let Silhouettes { list, arguments } = self.silhouettes;
         let (lower, size) = below.unwrap_or((points, 0));
-        let mut pass = graph.pass(format!("{NAME}.boxes {name}.{group}"), PassKind::Compute);
+        let mut pass = graph.pass(
+            format!("{technique}.boxes {name}.{group}"),
+            PassKind::Compute,
+        );
         pass.read(arguments, Access::Uniform(Stage::Compute));
         for image in [list, edges, points] {
             pass.read(image, Access::Sampled(Stage::Compute));
@@ -175,29 +181,34 @@ impl Lists {
         ends: ImageId,
         boxes: [ImageId; 3],
     ) -> Made {
-        let name = &inputs.light_name;
+        let (technique, name) = (self.technique, &inputs.light_name);
         let [across, down] = tile_counts(inputs.camera.size());
-        let used = graph.create_buffer(format!("{NAME}.used {name}"), BufferDesc { size: 16 });
-        let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
+        let used = graph.create_buffer(format!("{technique}.used {name}"), BufferDesc { size: 16 });
+        let mut pass = graph.pass(format!("{technique}.clear {name}"), PassKind::Transfer);
         let used = pass.overwrite(used, Access::Clear);
         pass.record(move |ctx| ctx.update_buffer(used, 0, &[0; 16]));
 
         let pool = texels(vk::Format::R32_UINT, self.sizes.chunks * CHUNK_TEXELS);
-        let pool = graph.create_image(format!("{NAME}.pool {name}"), pool);
+        let pool = graph.create_image(format!("{technique}.pool {name}"), pool);
         let boxed = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * self.sizes.chunks);
-        let chunk_boxes = graph.create_image(format!("{NAME}.chunk_boxes {name}"), boxed);
+        let chunk_boxes = graph.create_image(format!("{technique}.chunk_boxes {name}"), boxed);
         let blocks = self.sizes.blocks;
         let desc = texels(
             vk::Format::R32G32B32A32_UINT,
             across * down * self.sizes.lists,
         );
-        let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
+        let lists = graph.create_image(format!("{technique}.lists {name}"), desc);
         let (params, shafts, tiles) = (self.params, self.shafts, self.receivers.list);
-        let arguments = self.silhouettes.arguments;
-        let mut pass = graph.pass(format!("{NAME}.lists {name}"), PassKind::Compute);
+        let Silhouettes {
+            list: numbers,
+            arguments,
+        } = self.silhouettes;
+        let (edges, points) = (inputs.ids.edges, inputs.ids.points);
+        let mut pass = graph.pass(format!("{technique}.lists {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
         pass.read(arguments, Access::Uniform(Stage::Compute));
-        for image in [shafts, ends].into_iter().chain(boxes) {
+        let read = [shafts, ends, numbers, edges, points];
+        for image in read.into_iter().chain(boxes) {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         tiles.read(&mut pass);
@@ -221,6 +232,9 @@ impl Lists {
                 Bind::storage_image(10, pool),
                 Bind::storage_image(11, lists),
                 Bind::storage_image(12, chunk_boxes),
+                Bind::sampled(13, numbers, nearest),
+                Bind::sampled(14, edges, nearest),
+                Bind::sampled(15, points, nearest),
             ];
             let shader = &spirv::DBUFFER_LISTS_COMP;
             ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
@@ -237,11 +251,11 @@ impl Lists {
     }
 
     fn add_cutouts(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, made: Made) -> Made {
-        let name = &inputs.light_name;
+        let (technique, name) = (self.technique, &inputs.light_name);
         let [across, down] = tile_counts(inputs.camera.size());
         let (params, shafts, tiles) = (self.params, self.shafts, self.receivers.list);
         let (triangles, hierarchy) = (inputs.ids.triangles, inputs.ids.hierarchy);
-        let mut pass = graph.pass(format!("{NAME}.cutouts {name}"), PassKind::Compute);
+        let mut pass = graph.pass(format!("{technique}.cutouts {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
         for image in [shafts, triangles, hierarchy] {
             pass.read(image, Access::Sampled(Stage::Compute));
@@ -285,7 +299,7 @@ impl Lists {
         made: &Made,
         ends: ImageId,
     ) -> (Found, ImageId) {
-        let name = &inputs.light_name;
+        let (technique, name) = (self.technique, &inputs.light_name);
         let size = inputs.camera.size();
         let [across, down] = tile_counts(size);
         let Made {
@@ -294,16 +308,16 @@ impl Lists {
             lists,
             ..
         } = *made;
-        let mut penumbra = TileList::create(graph, &format!("{NAME}.penumbra {name}"), size);
-        let mut pass = graph.pass(format!("{NAME}.penumbra {name}"), PassKind::Transfer);
+        let mut penumbra = TileList::create(graph, &format!("{technique}.penumbra {name}"), size);
+        let mut pass = graph.pass(format!("{technique}.penumbra {name}"), PassKind::Transfer);
         penumbra.clear(&mut pass);
         let cleared = penumbra;
         pass.record(move |ctx| cleared.record_clear(ctx));
 
-        let through = add_through(graph, inputs);
+        let through = add_through(graph, inputs, technique);
         let (params, shafts, hard) = (self.params, self.shafts, self.hard);
         let tiles = self.receivers.list;
-        let mut pass = graph.pass(format!("{NAME}.settle {name}"), PassKind::Compute);
+        let mut pass = graph.pass(format!("{technique}.settle {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
         pass.read(through, Access::Uniform(Stage::Compute));
         for image in [shafts, lists, hard] {
@@ -346,11 +360,14 @@ impl Lists {
 }
 
 /// Whether a surface cuts through the light. Nothing cuts a sun.
-fn add_through(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> BufferId {
+fn add_through(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, technique: &str) -> BufferId {
     let name = &inputs.light_name;
-    let through = graph.create_buffer(format!("{NAME}.through {name}"), BufferDesc { size: 16 });
+    let through = graph.create_buffer(
+        format!("{technique}.through {name}"),
+        BufferDesc { size: 16 },
+    );
     if inputs.light.shape.is_sun() {
-        let mut pass = graph.pass(format!("{NAME}.through {name}"), PassKind::Transfer);
+        let mut pass = graph.pass(format!("{technique}.through {name}"), PassKind::Transfer);
         let through = pass.overwrite(through, Access::Clear);
         pass.record(move |ctx| ctx.update_buffer(through, 0, &[0; 16]));
         return through;
@@ -359,7 +376,7 @@ fn add_through(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> BufferId {
     let (triangles, hierarchy) = (inputs.ids.triangles, inputs.ids.hierarchy);
     let shape = shape_number(&inputs.light.shape);
     let nodes = inputs.scene.node_count() as u32;
-    let mut pass = graph.pass(format!("{NAME}.through {name}"), PassKind::Compute);
+    let mut pass = graph.pass(format!("{technique}.through {name}"), PassKind::Compute);
     pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
     pass.read(triangles, Access::Sampled(Stage::Compute));
     pass.read(hierarchy, Access::Sampled(Stage::Compute));

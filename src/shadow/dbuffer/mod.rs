@@ -39,7 +39,8 @@ use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferPart, Graph, ImageId, PassKind, Stage};
 use crate::light::{AreaLight, LightShape, ShapeKind};
 use bytemuck::{Pod, Zeroable};
-use lists::{Lists, Sizes};
+use lists::Sizes;
+pub(super) use lists::{Found, Lists};
 
 /// The technique's name.
 pub(super) const NAME: &str = "dbuffer";
@@ -89,27 +90,35 @@ pub(super) fn add_passes<'f>(
     }
     let base = format!("{NAME}.hard");
     let hard = hard::add_hard(graph, inputs, &base, format!("{base} {name}"));
+    let (tools, found, visibility) = add_edge_lists(graph, inputs, NAME, &options, hard);
+    add_visibility(graph, inputs, &options, &tools, &found, visibility)
+}
+
+/// Declares the passes that list each tile's edges, given what sees the light's centre: all but visibility of the
+/// listed tiles. Returns the visibility image too, in which the other tiles are done.
+pub(super) fn add_edge_lists(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    technique: &'static str,
+    options: &DbufferOptions,
+    hard: ImageId,
+) -> (Lists, Found, ImageId) {
+    let shape = inputs.light.shape;
     let size = inputs.camera.size();
-    let sizes = Sizes::new(inputs, &options);
+    let sizes = Sizes::new(inputs, options);
+    let nodes = inputs.scene.node_count() as u32;
     let params = DbufferParams {
-        counts: [
-            size[0],
-            size[1],
-            inputs.scene.node_count() as u32,
-            sizes.chunks,
-        ],
+        counts: [size[0], size[1], nodes, sizes.chunks],
         samples: samples::texels(options.samples, matches!(shape, LightShape::Rect { .. })),
         sizes: [sizes.blocks, sizes.lists, options.most_edges, 0],
     };
-    let params = add_uniform(
-        graph,
-        format!("{NAME}.params {}", inputs.light_name),
-        params,
-    );
-    let silhouettes = add_silhouettes(graph, inputs, NAME, SilhouetteRule::WholeLight, 1);
-    let receivers = add_receivers(graph, inputs, NAME, shape.reach());
-    let (shafts, _) = add_shafts(graph, inputs, (NAME, 1), params, &receivers);
+    let name = format!("{technique}.params {}", inputs.light_name);
+    let params = add_uniform(graph, name, params);
+    let silhouettes = add_silhouettes(graph, inputs, technique, SilhouetteRule::WholeLight, 1);
+    let receivers = add_receivers(graph, inputs, technique, shape.reach());
+    let (shafts, _) = add_shafts(graph, inputs, (technique, 1), params, &receivers);
     let tools = Lists {
+        technique,
         params,
         silhouettes,
         receivers,
@@ -118,7 +127,7 @@ pub(super) fn add_passes<'f>(
         sizes,
     };
     let (found, visibility) = tools.add(graph, inputs);
-    add_visibility(graph, inputs, &options, &tools, &found, visibility)
+    (tools, found, visibility)
 }
 
 /// The disk of the same area, where a rectangle shall count as that: a D-buffer knows disks alone.
@@ -165,14 +174,14 @@ fn add_visibility<'f>(
     inputs: &ShadowInputs<'f>,
     options: &DbufferOptions,
     tools: &Lists,
-    found: &lists::Found,
+    found: &Found,
     visibility: ImageId,
 ) -> ShadowMask {
     let name = &inputs.light_name;
     let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
     let (view_params, part) = inputs.view_params;
     let (params, hard, numbers) = (tools.params, tools.hard, tools.silhouettes.list);
-    let lists::Found {
+    let Found {
         pool,
         chunk_boxes,
         lists,

@@ -1,14 +1,25 @@
 //! Technique `oess`: Occluding Edges Soft Shadows of line lights (C. L. Reimann, B. Dreier).
 //!
-//! Both ends of the line get a shadow map, with the images' x axis along the line: a row is one plane
-//! through the light, and in that plane shadows are a matter of two dimensions. An occluding edge
-//! divides the line into a part that is seen and one that is not.
+//! A receiver and the line span a plane, and in that plane shadows are a matter of two dimensions. An
+//! occluding edge divides the line into a part that is seen and one that is not.
 //!
-//! Published are edges found from neighbouring texels of one row, and written to all texels of the
-//! penumbra that begins there. Here the edge of a texel is the tangent from its surface to the hull
-//! of its row, which is the exact one for all that the end sees, and a scan along the row finds it
-//! in linear time (`glsl/oess/outreach.comp`). A receiver then looks at the triangle at its edge, so
-//! that neither texels nor rows show (`glsl/oess/oess.glsl`).
+//! Published are edges found in shadow maps of both ends, whose x axis is along the line, so that a row is
+//! one such plane; as future work, edges of the mesh instead of pixels. That is what is done by default: each
+//! tile of the picture lists the silhouettes between its surfaces and the line ([`super::dbuffer`] has the
+//! lists), and each receiver takes those that its plane cuts (`glsl/oess/silhouettes.comp`). There are no
+//! texels, rows, candidates or segments then, and nothing hides between the ends.
+//!
+//! | pass | makes |
+//! |---|---|
+//! | `map`, `visibility` of `oess.hard` | what sees the line's centre |
+//! | `silhouettes.*`, `boxes`, `start`, `tiles`, `shafts`, `lists`, `through`, `settle` | the edges of each tile: [`super::dbuffer`] |
+//! | `visibility` | visibility of tiles with edges |
+//!
+//! With the option `outreach=hull`, and where triangles have holes, edges come from maps of the ends. The edge of a
+//! texel is the tangent from its surface to the hull of its row, which is the exact one for all that the end
+//! sees, and a scan along the row finds it in linear time (`glsl/oess/outreach.comp`). A receiver then looks
+//! at the triangle at its edge, so that neither texels nor rows show (`glsl/oess/oess.glsl`). The steps as
+//! published are the options' other values.
 //!
 //! | pass | makes |
 //! |---|---|
@@ -27,13 +38,14 @@
 
 mod options;
 mod outreach;
+mod silhouettes;
 mod views;
 mod visibility;
 
 pub use options::{Find, MOST_SEGMENTS, OessOptions, Outreach};
 
 use super::light_view::LightView;
-use super::map::add_maps_of;
+use super::map::{MAP_SIZE, add_maps_of};
 use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, hard};
 use crate::geometry::DrawTarget;
@@ -64,6 +76,30 @@ struct OessParams {
     views: [[LightView; MOST_POINTS]; MOST_SECTORS],
 }
 
+/// `LineBlock` in `oess/silhouettes.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct LineParams {
+    start: [f32; 4],
+    axis: [f32; 4],
+    profile: [[f32; 4]; MAX_PROFILE],
+}
+
+impl LineParams {
+    fn new(light: &AreaLight, length: f32) -> Self {
+        let (cells, profile) = profile_of(&light.profile);
+        let start = light.center - light.axis_x * (0.5 * length);
+        Self {
+            start: start.extend(length).to_array(),
+            axis: light.axis_x.extend(cells as f32).to_array(),
+            profile,
+        }
+    }
+}
+
+/// Width and height of an end's map in texels.
+const END_MAP_SIZE: u32 = 1024;
+
 /// A line whose length is a smaller part than this of the distance to what it lights is a point: no
 /// texel of a map could tell its ends apart.
 const SHORTEST: f32 = 1.0e-5;
@@ -78,25 +114,42 @@ pub(super) fn add_passes<'f>(
         LightShape::Line { length } => length,
         _ => 0.0,
     };
-    if length <= SHORTEST * farthest_receiver(inputs) {
-        return hard::add_passes(graph, inputs);
+    if length <= SHORTEST * farthest_receiver(inputs) || inputs.scene.triangle_count() == 0 {
+        return hard::add_passes_at(graph, inputs, options.resolution.unwrap_or(MAP_SIZE));
     }
+    if options.outreach == Outreach::Silhouettes && !inputs.scene.has_masks() {
+        let texels = options.resolution.unwrap_or(MAP_SIZE);
+        let line = LineParams::new(&inputs.light, length);
+        return silhouettes::add_passes(graph, inputs, line, texels);
+    }
+    add_maps(graph, inputs, options, length)
+}
+
+/// Declares the passes that find edges in maps of the line's ends.
+fn add_maps<'f>(
+    graph: &mut Graph<'f>,
+    inputs: &ShadowInputs<'f>,
+    options: OessOptions,
+    length: f32,
+) -> ShadowMask {
+    let texels = options.resolution.unwrap_or(END_MAP_SIZE);
+    let by_hull = matches!(options.outreach, Outreach::Hull | Outreach::Silhouettes);
     let boxes = inputs.scene.draws().iter().map(|draw| draw.bounds);
     let boxes: Vec<_> = boxes.collect();
-    let by_need = options.segments.is_none() && options.outreach == Outreach::Hull;
+    let by_need = options.segments.is_none() && by_hull;
     let views_of = |segments: u32| {
         let points = segments as usize + 1;
         line_views(&inputs.light, &inputs.receivers, &boxes, points, by_need)
     };
     let mut views = views_of(options.segments.unwrap_or(1));
     let segments = match options.segments {
-        None if by_need => segments_for(&views, options.resolution),
+        None if by_need => segments_for(&views, texels),
         fixed => fixed.unwrap_or(1),
     };
     if by_need && segments > 1 {
         views = views_of(segments);
     }
-    let params = params_of(&inputs.light, &views, &options, segments, length);
+    let params = params_of(&inputs.light, &views, texels, segments, length);
     let buffer = add_uniform(
         graph,
         format!("{NAME}.params {}", inputs.light_name),
@@ -110,7 +163,7 @@ pub(super) fn add_passes<'f>(
         NAME,
         &views.views,
         DrawTarget::Ids,
-        (options.resolution, draws),
+        (texels, draws),
     );
     let line = visibility::Line {
         options,
@@ -145,7 +198,7 @@ fn farthest_receiver(inputs: &ShadowInputs<'_>) -> f32 {
 fn params_of(
     light: &AreaLight,
     views: &LineViews,
-    options: &OessOptions,
+    resolution: u32,
     segments: u32,
     length: f32,
 ) -> OessParams {
@@ -156,12 +209,7 @@ fn params_of(
     let mut params = OessParams {
         start: start.extend(segment).to_array(),
         axis: light.axis_x.extend(cells as f32).to_array(),
-        counts: [
-            views.sectors as u32,
-            points as u32,
-            options.resolution,
-            options.resolution,
-        ],
+        counts: [views.sectors as u32, points as u32, resolution, resolution],
         shift: [[0.0; 4]; MOST_SECTORS],
         profile,
         views: [[LightView::default(); MOST_POINTS]; MOST_SECTORS],
@@ -169,7 +217,7 @@ fn params_of(
     for (layer, view) in views.views.views.iter().enumerate() {
         params.views.as_flattened_mut()[layer] = *view;
         // A point at depth z moves by segment / z; the map holds scale.z / z.
-        let texels = segment * view.scale[0] * options.resolution as f32;
+        let texels = segment * view.scale[0] * resolution as f32;
         params.shift[layer / points] = [texels / view.scale[2], 0.0, 0.0, 0.0];
     }
     params

@@ -8,6 +8,9 @@ pub const MOST_SEGMENTS: u32 = 8;
 /// How the occluding edges that hide light from a texel are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outreach {
+    /// By the tile: silhouettes of the mesh that are between its surfaces and the line. Scenes whose triangles
+    /// have holes take `Hull`.
+    Silhouettes,
     /// By tangents to the hull of the texel's row: the edge itself, whatever its place.
     Hull,
     /// By a scan for two candidates among the edges that [`Find`] finds.
@@ -18,7 +21,7 @@ pub enum Outreach {
     Scatter,
 }
 
-/// Which texels are occluding edges; not used by [`Outreach::Hull`].
+/// Which texels are occluding edges; used by none of the first two [`Outreach`]es.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Find {
     /// Those whose corresponding pixel lies before that of the texel before.
@@ -31,7 +34,8 @@ pub enum Find {
     Both,
 }
 
-const OUTREACHES: [(&str, Outreach); 4] = [
+const OUTREACHES: [(&str, Outreach); 5] = [
+    ("silhouettes", Outreach::Silhouettes),
     ("hull", Outreach::Hull),
     ("scan", Outreach::Scan),
     ("search", Outreach::Search),
@@ -58,8 +62,9 @@ fn name_of<T: Copy + PartialEq>(list: &[(&'static str, T)], value: T) -> &'stati
 /// Options of `oess`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OessOptions {
-    /// Texels across and down each end's map, 64 to 4096.
-    pub resolution: u32,
+    /// Texels across and down a map, 64 to 4096. None: 2048 of that of the line's centre, 1024 of those of its
+    /// ends.
+    pub resolution: Option<u32>,
     /// Segments that the line is cut into, 1 to [`MOST_SEGMENTS`]; they share the maps of their ends.
     /// None: as many as what hides between the line's ends may need, where it does.
     pub segments: Option<u32>,
@@ -81,12 +86,12 @@ pub struct OessOptions {
 impl OessOptions {
     /// What the technique does without options.
     pub const DEFAULT: Self = Self {
-        resolution: 1024,
+        resolution: None,
         segments: None,
         exact: true,
         gaps: true,
         walk: 2,
-        outreach: Outreach::Hull,
+        outreach: Outreach::Silhouettes,
         find: Find::Both,
         by_place: false,
     };
@@ -95,9 +100,9 @@ impl OessOptions {
     pub(in crate::shadow) const ALL: &[TechniqueOption] = &[
         TechniqueOption::new(
             "resolution",
-            "1024",
-            "64 to 4096",
-            "texels across and down an end's map",
+            "auto",
+            "auto (2048 of the centre's, 1024 of an end's) or 64 to 4096",
+            "texels across and down a map",
         ),
         TechniqueOption::new(
             "segments",
@@ -125,9 +130,10 @@ impl OessOptions {
         ),
         TechniqueOption::new(
             "outreach",
-            "hull",
-            "hull, scan (two of the edges found), search (slow check of scan) or scatter (published)",
-            "how occluding edges reach the texels of their penumbrae",
+            "silhouettes",
+            "silhouettes (of the mesh, listed for each tile) or, in maps of the line's ends, hull, scan (two of the \
+             edges found), search (slow check of scan) or scatter (published)",
+            "how occluding edges reach the receivers of their penumbrae; the other options are for maps",
         ),
         TechniqueOption::new(
             "find",
@@ -146,7 +152,8 @@ impl OessOptions {
     /// The values, in the order of [`ALL`](Self::ALL).
     pub(in crate::shadow) fn values(&self) -> Vec<String> {
         vec![
-            self.resolution.to_string(),
+            self.resolution
+                .map_or("auto".to_string(), |texels| texels.to_string()),
             self.segments
                 .map_or("auto".to_string(), |segments| segments.to_string()),
             if self.exact { "exact" } else { "texels" }.to_string(),
@@ -164,7 +171,8 @@ impl OessOptions {
             value.parse::<u32>().ok().filter(|n| range.contains(n))
         };
         match option {
-            "resolution" => self.resolution = number(64..=4096)?,
+            "resolution" if value == "auto" => self.resolution = None,
+            "resolution" => self.resolution = Some(number(64..=4096)?),
             "segments" if value == "auto" => self.segments = None,
             "segments" => self.segments = Some(number(1..=MOST_SEGMENTS)?),
             "edges" => {

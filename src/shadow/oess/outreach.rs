@@ -109,7 +109,9 @@ pub(super) fn add_outreach(
                 },
             };
             [image, steps] = match options.outreach {
-                Outreach::Hull => add_hull(graph, maps, &at, of.rows, [image, steps]),
+                Outreach::Hull | Outreach::Silhouettes => {
+                    add_hull(graph, maps, &at, of.rows, [image, steps])
+                }
                 _ => add_candidates(graph, inputs, options, maps, &at, [image, steps]),
             };
         }

@@ -197,6 +197,8 @@ impl Line {
                 Bind::storage_image(16, images.influences),
                 Bind::storage_image(17, images.open),
             ];
+            let maps = [Outreach::Hull, Outreach::Silhouettes];
+            let candidates = u32::from(!maps.contains(&options.outreach));
             // Four steps of the grid that vertices snap to: SNAP_TEXELS in hard.glsl.
             let steps = ctx.gpu().info().limits.sub_pixel_precision_bits.min(16);
             let snap = 4.0 / (1u32 << steps) as f32;
@@ -207,7 +209,7 @@ impl Line {
                     (2, u32::from(options.exact)),
                     (3, options.walk),
                     (4, u32::from(options.gaps)),
-                    (5, u32::from(options.outreach != Outreach::Hull)),
+                    (5, candidates),
                     (6, u32::from(options.by_place)),
                 ],
                 ..ComputePipelineDesc::new(&spirv::OESS_VISIBILITY_COMP)

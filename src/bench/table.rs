@@ -49,8 +49,9 @@ fn row(results: &Results, entry: &Entry) -> Option<Row> {
 /// What choices by the table are worth on scenes that it does not know: a Markdown table, one row for each target.
 pub fn verdict(table: &Table) -> String {
     let mut text = String::from(
-        "| target error | lights | within it | possible | time of the fastest no worse, mean | at most 1.3 | largest |\n\
-         | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
+        "| target error | lights | within it | possible | over the fastest no worse, mean | at most 1.3 | largest \
+         | over the fastest good enough, mean | at most 1.3 | largest |\n\
+         | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
     );
     for target_error in [0.1, 0.05, 0.02, 0.015, 0.01] {
         let options = AutoOptions {
@@ -59,18 +60,30 @@ pub fn verdict(table: &Table) -> String {
         };
         let all = held_out(table, &options);
         let count = |is: &dyn Fn(&HeldOut) -> bool| all.iter().filter(|one| is(one)).count();
-        let ratios: Vec<f64> = all.iter().map(|one| one.ms / one.best_ms).collect();
-        let mean = (ratios.iter().map(|r| r.ln()).sum::<f64>() / ratios.len().max(1) as f64).exp();
+        let no_worse = all.iter().map(|one| one.ms / one.best_ms);
+        // A choice that misses the target is not held against one that does not.
+        let good = |one: &HeldOut| one.target_ms.filter(|_| one.rmse <= target_error);
+        let good_enough = all
+            .iter()
+            .map(|one| one.ms / good(one).unwrap_or(one.best_ms));
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
-            "| {target_error} | {} | {} | {} | {mean:.2} | {} | {:.1} |",
+            "| {target_error} | {} | {} | {} | {} | {} |",
             all.len(),
             count(&|one| one.rmse <= target_error),
             count(&|one| one.target_ms.is_some()),
-            ratios.iter().filter(|r| **r <= 1.3).count(),
-            ratios.iter().copied().fold(1.0, f64::max),
+            ratios(no_worse.collect()),
+            ratios(good_enough.collect()),
         );
     }
     text
+}
+
+/// Geometric mean, number of those that are at most 1.3, and the largest.
+fn ratios(all: Vec<f64>) -> String {
+    let mean = (all.iter().map(|r| r.ln()).sum::<f64>() / all.len().max(1) as f64).exp();
+    let near = all.iter().filter(|r| **r <= 1.3).count();
+    let largest = all.iter().copied().fold(1.0, f64::max);
+    format!("{mean:.2} | {near} | {largest:.1}")
 }

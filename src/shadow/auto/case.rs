@@ -36,7 +36,8 @@ impl Case {
             let draws = blocking
                 .iter()
                 .filter(|draw| !masked || draw.mask.is_some());
-            draws.map(|draw| f64::from(draw.index_count) / 3.0).sum()
+            // An empty sum of floats is -0.
+            draws.fold(0.0, |sum, draw| sum + f64::from(draw.index_count) / 3.0)
         };
         let (triangles, holes) = (count(false), count(true));
         let corners = || {

@@ -55,19 +55,22 @@ pub fn choose(table: &Table, cases: &[Case], options: &AutoOptions) -> Vec<Choic
         .iter()
         .map(|at| candidates(table, &cases[*at]))
         .collect();
-    let picked = match options.budget_ms {
+    let picked: Vec<Option<usize>> = match options.budget_ms {
         None => candidates
             .iter()
             .map(|all| cheapest_within(all, options.target_error))
             .collect(),
         Some(budget) => within_budget(&candidates, options.target_error, budget),
     };
+    let all_ms: f64 = (candidates.iter().zip(&picked))
+        .filter_map(|(all, picked)| Some(all.get((*picked)?)?.expected.ms))
+        .sum();
     for ((at, all), picked) in open.into_iter().zip(&candidates).zip(picked) {
         choices[at] = Some(match picked.and_then(|index| all.get(index)) {
             Some(candidate) => Choice {
                 technique: candidate.technique,
                 expected: Some(candidate.expected),
-                reason: reason(candidate, all.len(), options),
+                reason: reason(candidate, all.len(), all_ms, options),
             },
             None => Choice {
                 technique: UNKNOWN,
@@ -120,8 +123,8 @@ fn candidates(table: &Table, case: &Case) -> Vec<Candidate> {
     all.sort_by(|a, b| a.expected.ms.total_cmp(&b.expected.ms));
     let mut best = f64::INFINITY;
     all.retain(|candidate| {
-        let is_better = candidate.expected.rmse < best;
-        best = best.min(candidate.expected.rmse);
+        let is_better = candidate.expected.likely_rmse < best;
+        best = best.min(candidate.expected.likely_rmse);
         is_better
     });
     all
@@ -131,7 +134,7 @@ fn candidates(table: &Table, case: &Case) -> Vec<Candidate> {
 fn cheapest_within(all: &[Candidate], target: f64) -> Option<usize> {
     let good = all
         .iter()
-        .position(|candidate| candidate.expected.rmse <= target);
+        .position(|candidate| candidate.expected.likely_rmse <= target);
     good.or_else(|| all.len().checked_sub(1))
 }
 
@@ -149,7 +152,7 @@ fn within_budget(lights: &[Vec<Candidate>], target: f64, budget: f64) -> Vec<Opt
         for (light, index) in picked.iter().enumerate() {
             let Some(index) = *index else { continue };
             let now = at(light, index);
-            if now.rmse <= target {
+            if now.likely_rmse <= target {
                 continue;
             }
             for next in index + 1..lights[light].len() {
@@ -158,11 +161,12 @@ fn within_budget(lights: &[Vec<Candidate>], target: f64, budget: f64) -> Vec<Opt
                 if spent + more > budget {
                     break;
                 }
-                let gain = (now.rmse * now.rmse - then.rmse * then.rmse) / more.max(1e-9);
+                let square = |expected: Expected| expected.likely_rmse * expected.likely_rmse;
+                let gain = (square(now) - square(then)) / more.max(1e-9);
                 if best.is_none_or(|(most, ..)| gain > most) {
                     best = Some((gain, light, next));
                 }
-                if then.rmse <= target {
+                if then.likely_rmse <= target {
                     break;
                 }
             }
@@ -174,16 +178,27 @@ fn within_budget(lights: &[Vec<Candidate>], target: f64, budget: f64) -> Vec<Opt
     }
 }
 
-fn reason(candidate: &Candidate, of: usize, options: &AutoOptions) -> String {
-    let Expected { rmse, ms } = candidate.expected;
+/// `of` is the number of candidates, `all_ms` what is expected of all lights together.
+fn reason(candidate: &Candidate, of: usize, all_ms: f64, options: &AutoOptions) -> String {
+    let Expected {
+        rmse,
+        likely_rmse: likely,
+        ms,
+    } = candidate.expected;
     let target = options.target_error;
     let verdict = match options.budget_ms {
-        None if rmse <= target => format!("the cheapest expected within {target}"),
+        None if likely <= target => format!("the cheapest expected within {target}"),
         None => format!("none is expected within {target}, and this is the best"),
-        Some(budget) if rmse <= target => format!("within {target} and its part of {budget} ms"),
+        // Steps are added up in another order than they were taken in.
+        Some(budget) if all_ms > budget * (1.0 + 1e-9) => {
+            format!("the cheapest, though {budget} ms are too few: {all_ms:.1} ms for all lights")
+        }
+        Some(budget) if likely <= target => format!("within {target} and its part of {budget} ms"),
         Some(budget) => format!("the best of its part of {budget} ms"),
     };
-    format!("{verdict} of {of} worth considering: error {rmse:.3}, {ms:.1} ms expected")
+    format!(
+        "{verdict} of {of} worth considering: error {rmse:.3}, hardly above {likely:.3}, and {ms:.1} ms expected"
+    )
 }
 
 #[cfg(test)]
@@ -252,7 +267,7 @@ mod tests {
                     choose(Table::reference(), &[case(shape)], &options(target, None)).remove(0);
                 if let (Some(last), Some(now)) = (last, choice.expected) {
                     assert!(
-                        now.ms >= last.ms && now.rmse <= last.rmse,
+                        now.ms >= last.ms && now.likely_rmse <= last.likely_rmse,
                         "{shape:?} {target}: {choice:?}"
                     );
                 }
@@ -268,10 +283,13 @@ mod tests {
             let choices = choose(Table::reference(), &cases, &options(1e-3, Some(budget)));
             let expected = choices.iter().filter_map(|choice| choice.expected);
             expected.fold((0.0, 0.0), |(ms, error), e| {
-                (ms + e.ms, error + e.rmse * e.rmse)
+                (ms + e.ms, error + e.likely_rmse * e.likely_rmse)
             })
         };
         let (least, worst) = total(1e-3);
+        for choice in choose(Table::reference(), &cases, &options(0.5, Some(0.5 * least))) {
+            assert!(choice.reason.contains("are too few"), "{}", choice.reason);
+        }
         let mut last = worst;
         for budget in [1.0, 2.0, 4.0, 16.0].map(|factor| factor * least) {
             let (ms, error) = total(budget);

@@ -3,6 +3,7 @@
 mod analysis;
 mod format;
 mod group;
+mod outcomes;
 mod plot;
 mod summary;
 

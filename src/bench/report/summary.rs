@@ -2,11 +2,12 @@
 
 use std::fmt::Write as _;
 
-use super::analysis::{Metric, Overall, Point, base, overall};
+use super::analysis::{Overall, Point, base, overall};
 use super::format::{breakable, error, escape, ms, ratio, signed};
+use super::outcomes::{self, Outcome, RIGHT};
 use super::plot::{Families, Plot};
 use super::scene_name;
-use crate::bench::results::{Entry, FailureKind, ReferenceEntry, Results};
+use crate::bench::results::Results;
 
 pub(super) fn write(page: &mut String, results: &Results, families: Families<'_>) {
     let all = overall(results);
@@ -124,8 +125,8 @@ fn table(page: &mut String, results: &Results, all: &[Overall], families: Famili
 /// Scenes by techniques, each cell with its error, tinted by it.
 fn matrix(page: &mut String, results: &Results, families: Families<'_>) {
     page.push_str(
-        "<section id=\"matrix\" class=\"card\">\n<h2>Penumbra RMSE by scene</h2>\n\
-         <div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Penumbra RMSE by scene \
+        "<section id=\"matrix\" class=\"card\">\n<h2>Error by scene</h2>\n\
+         <div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Error by scene \
          and technique\">\n<table class=\"matrix\">\n<thead><tr><th scope=\"col\">Scene, light</th>",
     );
     for label in &results.settings.techniques {
@@ -148,42 +149,19 @@ fn matrix(page: &mut String, results: &Results, families: Families<'_>) {
         );
         for label in &results.settings.techniques {
             let entry = entries.iter().find(|entry| entry.label == *label);
-            page.push_str(&matrix_cell(reference, entry.copied()));
+            page.push_str(&Outcome::of(reference, entry.copied()).html());
         }
         page.push_str("</tr>\n");
     }
-    page.push_str(
-        "</tbody>\n</table>\n</div>\n<p class=\"note\">The stronger the colour, the more \
-         error. A dash: no penumbra in sight.</p>\n</section>\n",
+    page.push_str("</tbody>\n");
+    outcomes::counts(page, results);
+    let _ = writeln!(
+        page,
+        "</table>\n</div>\n<p class=\"note\">The stronger the colour, the more error; of all valid \
+         pixels where the truth has no penumbra. Up to {RIGHT} counts as right, and more as degraded. \
+         Why a technique refuses a light or has failed is said <a href=\"#failures\">below</a>.</p>\n\
+         </section>"
     );
-}
-
-fn matrix_cell(reference: &ReferenceEntry, entry: Option<&Entry>) -> String {
-    let Some(entry) = entry else {
-        return cell(None);
-    };
-    if let Some(failure) = &entry.failure {
-        let word = match failure.kind {
-            FailureKind::Unsupported => "cannot",
-            FailureKind::Failed => "failed",
-            FailureKind::Crashed => "crashed",
-        };
-        let reason = escape(&failure.reason);
-        return format!("<td class=\"n bad\" title=\"{reason}\">{word}</td>");
-    }
-    let metric = Metric::of(reference);
-    match metric.rmse(entry).filter(|_| metric == Metric::Penumbra) {
-        None => cell(None),
-        Some(rmse) => {
-            // From 0.001 to 0.5, by its logarithm.
-            let part = (rmse.max(1e-6).log10() + 3.0) / (0.5f64.log10() + 3.0);
-            let tint = (70.0 * part.clamp(0.0, 1.0)).round();
-            format!(
-                "<td class=\"n tint\" style=\"--part:{tint}%\">{}</td>",
-                error(rmse)
-            )
-        }
-    }
 }
 
 /// Cells without a result, with their reasons.

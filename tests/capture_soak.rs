@@ -1,0 +1,225 @@
+//! Thousands of frames in one process: lights move, pictures change their size, techniques and scenes take
+//! turns. Memory stays as it is, the validation layer stays silent, and the last frame is that of a process
+//! that has drawn nothing before.
+#![cfg(feature = "cli")]
+
+mod support;
+
+use std::process::Command;
+use std::time::Instant;
+
+use antumbra::capture::{CapturedFrame, FrameRenderer, FrameRequest};
+use antumbra::gpu::GpuOptions;
+use antumbra::light::ShapeKind;
+use antumbra::shadow::Technique;
+use antumbra::stress::{Case, cases};
+
+/// Frames of a scene before the next one is loaded.
+const FRAMES_OF_A_SCENE: usize = 10;
+const SIZES: [[u32; 2]; 5] = [[48, 48], [64, 40], [17, 64], [96, 96], [8, 8]];
+/// Name of the variable that tells a fresh process which frame to draw: its number and the number of scenes.
+const FRESH: &str = "ANTUMBRA_SOAK_FRESH";
+
+/// What happens in each frame; after all scenes it begins anew.
+struct Course {
+    scenes: Vec<Case>,
+}
+
+impl Course {
+    /// Of at most that many stress scenes, so that each shape of light has its share.
+    fn new(count: usize) -> Self {
+        let of_kind = |kind: ShapeKind| {
+            let all = cases().into_iter();
+            let mut found = all.filter(move |case| case.area_light().shape.kind() == kind);
+            std::iter::from_fn(move || found.next())
+        };
+        let mut kinds: Vec<_> = ShapeKind::ALL.into_iter().map(of_kind).collect();
+        let mut scenes = Vec::new();
+        loop {
+            let next: Vec<Case> = kinds.iter_mut().filter_map(Iterator::next).collect();
+            if next.is_empty() || scenes.len() >= count {
+                scenes.truncate(count);
+                return Self { scenes };
+            }
+            scenes.extend(next);
+        }
+    }
+
+    fn period(&self) -> usize {
+        self.scenes.len() * FRAMES_OF_A_SCENE
+    }
+
+    fn draw(&self, number: usize, renderer: &mut Option<FrameRenderer<'static>>) -> CapturedFrame {
+        let at = number % self.period();
+        let case = &self.scenes[at / FRAMES_OF_A_SCENE];
+        let mut scene = case.scene.clone();
+        let light = &mut scene.lights[case.light].light;
+        // A hundredth of its distance from the camera to and fro.
+        let step = (at % 4) as f32 * 0.01;
+        light.center += (case.camera.position - light.center) * step;
+        let light = *light;
+        // Of those that can draw such a light; every scene begins with another one.
+        let able = Technique::ALL
+            .iter()
+            .copied()
+            .filter(|t| t.check(&light).is_ok());
+        let able: Vec<Technique> = able.collect();
+        let request = FrameRequest {
+            camera: case.camera.clone(),
+            size: SIZES[at / 3 % SIZES.len()],
+            lights: vec![case.light],
+            technique: able[(at / 2 + at / FRAMES_OF_A_SCENE) % able.len()],
+        };
+        let renderer = match renderer {
+            Some(renderer) => {
+                renderer.set_scene(scene).unwrap();
+                renderer
+            }
+            None => {
+                // Without the layer: for telling its memory from ours.
+                let plain = std::env::var_os("ANTUMBRA_SOAK_PLAIN").is_some();
+                let gpu = support::create(&GpuOptions {
+                    validation: !plain,
+                    ..support::options()
+                });
+                renderer.insert(FrameRenderer::owning(gpu, scene).unwrap())
+            }
+        };
+        let frame = match at % 3 {
+            0 => renderer.render(&request),
+            1 => renderer.render_static(&request),
+            _ => renderer.render_counted(&request),
+        };
+        frame.unwrap_or_else(|error| panic!("frame {number}, {}: {error}", case.name))
+    }
+}
+
+/// All bits of a frame in 64.
+fn digest(frame: &CapturedFrame) -> u64 {
+    let color = frame.color.iter().flatten();
+    let values = color.chain(&frame.lights[0].visibility);
+    // Fowler, Noll, Vo.
+    values.fold(0xcbf2_9ce4_8422_2325, |hash, value| {
+        (hash ^ u64::from(value.to_bits())).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+/// Memory of the process in bytes.
+fn resident_bytes() -> u64 {
+    let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
+    let pages = text
+        .split(' ')
+        .nth(1)
+        .and_then(|pages| pages.parse::<u64>().ok());
+    pages.unwrap_or(0) * 4096
+}
+
+/// What must not grow from one round through all scenes to the next.
+#[derive(Debug, PartialEq, Eq)]
+struct Held {
+    device_bytes: u64,
+    host_bytes: u64,
+    pipelines: usize,
+}
+
+impl Held {
+    fn of(renderer: &FrameRenderer<'_>) -> Self {
+        let gpu = renderer.gpu();
+        let memory = gpu.memory_use();
+        Self {
+            device_bytes: memory.device_bytes,
+            host_bytes: memory.host_bytes,
+            pipelines: gpu.pipelines_created(),
+        }
+    }
+}
+
+/// Bytes of memory blocks that the allocator has taken from the device. How well they are filled changes with
+/// what came before.
+fn reserved_bytes(renderer: &FrameRenderer<'_>) -> u64 {
+    let report = renderer.gpu().allocator().generate_report();
+    report.total_capacity_bytes
+}
+
+/// Draws at least that many frames, in rounds through `scenes` scenes. In the second half of them the process,
+/// and the allocator's blocks, may take `growth` bytes more than in the first: a driver's caches fill, and more and
+/// more pages of its memory have been touched once.
+fn soak(scenes: usize, frames: usize, growth: u64) {
+    let _one = support::serial();
+    let course = Course::new(scenes);
+    let rounds = frames.div_ceil(course.period());
+    let mut renderer = None;
+    let (mut held, mut grown) = (None, [0; 2]);
+    let begin = Instant::now();
+    let mut last = 0;
+    for round in 0..rounds {
+        for at in 0..course.period() {
+            last = digest(&course.draw(round * course.period() + at, &mut renderer));
+        }
+        let renderer = renderer.as_ref().unwrap();
+        support::assert_no_messages(&renderer.gpu().messages());
+        let now = Held::of(renderer);
+        let bytes = [reserved_bytes(renderer), resident_bytes()];
+        let [reserved, resident] = bytes.map(|bytes| bytes as f64 * 1.0e-6);
+        println!(
+            "{:6} frames, {:.0?}: {now:?}, blocks {reserved:.1} MB, process {resident:.1} MB",
+            (round + 1) * course.period(),
+            begin.elapsed(),
+        );
+        // The first round makes what is kept, and drivers fill caches of their own.
+        match round {
+            0 => held = Some(now),
+            _ => assert_eq!(held.as_ref(), Some(&now)),
+        }
+        if 2 * round < rounds {
+            grown = [0, 1].map(|at| bytes[at].max(grown[at]));
+        }
+        let flat = bytes
+            .iter()
+            .zip(grown)
+            .all(|(now, then)| *now <= then + growth);
+        assert!(
+            flat || rounds < 8,
+            "{bytes:?} bytes of memory after {grown:?}"
+        );
+    }
+    let messages = renderer.unwrap().destroy().unwrap();
+    support::assert_no_messages(&messages);
+    let frame = format!("{} {scenes}", rounds * course.period() - 1);
+    let fresh = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "a_fresh_process", "--ignored", "--nocapture"])
+        .env(FRESH, frame)
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&fresh.stdout);
+    assert!(
+        fresh.status.success() && text.contains(&format!("digest {last:016x}")),
+        "{last:016x} is not that of a fresh process: {text}"
+    );
+}
+
+#[test]
+fn two_hundred_frames() {
+    soak(10, 200, 0);
+}
+
+/// Run by hand: `make soak`.
+#[test]
+#[ignore = "an hour"]
+fn ten_thousand_frames() {
+    soak(usize::MAX, 10_000, 64 << 20);
+}
+
+#[test]
+#[ignore = "what the others start"]
+fn a_fresh_process() {
+    let Ok(frame) = std::env::var(FRESH) else {
+        return;
+    };
+    let (number, scenes) = frame.split_once(' ').unwrap();
+    let course = Course::new(scenes.parse().unwrap());
+    let mut renderer = None;
+    let frame = course.draw(number.parse().unwrap(), &mut renderer);
+    println!("digest {:016x}", digest(&frame));
+    support::assert_no_messages(&renderer.unwrap().destroy().unwrap());
+}

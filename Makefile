@@ -1,4 +1,4 @@
-.PHONY: help demo test bench bench-check bench-plan bench-batch figures study studies table wgpu-host slurm-test cluster-check soak faults clean-deps
+.PHONY: help demo test bench bench-check pictures bench-plan bench-batch figures study studies table wgpu-host slurm-test cluster-check soak faults clean-deps
 
 # For make bench: scenes, what is held against each other, picture size, and where it goes.
 SCENES ?= assets
@@ -20,6 +20,7 @@ help:
 	@echo "make test        set up this machine, then run every check and test"
 	@echo "make bench       run time against error of all techniques over all scenes, to out/bench/"
 	@echo "make bench-check look at out/bench/report.html in headless Chromium"
+	@echo "make pictures    what the README shows of make bench, to docs/pictures/"
 	@echo "make figures     scenes after the papers' figures, to out/figures/"
 	@echo "make study       the tables of one file of benches/studies/, to out/studies/: STUDY=name"
 	@echo "make studies     the tables of all"
@@ -52,6 +53,9 @@ bench:
 
 bench-check:
 	scripts/report_browser.py $(OUT)/report.html $(OUT)/screenshots
+
+pictures: bench
+	scripts/readme_pictures.py $(OUT) docs/pictures
 
 figures:
 	scripts/setup.sh bench

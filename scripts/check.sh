@@ -96,7 +96,7 @@ show_jobs() {
 }
 # What of the other files is the same whatever the driver: that the validation layer sees a missing barrier,
 # arguments and file names of the program.
-anywhere=(random_graphs_without_one_of_their_barriers choice:: failures::
+anywhere=(random_graphs_without_one_of_their_barriers choice:: failures:: interrupted::
     help_and_version_go formats_follow_the_ending lights_are_chosen_by an_image_says_how_bright
     a_report_counts_tiles a_scene_without_a_camera_is graph_prints_the_plan techniques_are_listed
     wrong_names_of_images_exit_2 light_in_the_name_of_a_picture)

@@ -189,7 +189,7 @@ fn record(
         size,
         lights,
         technique,
-    );
+    )?;
 
     // Into the host's image; a pass of the host's own could as well read `visibility` itself.
     let visibility = found.masks[0].visibility;

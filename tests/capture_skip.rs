@@ -236,7 +236,8 @@ fn a_light_that_lights_nothing_is_not_shaded() {
             [SIZE; 2],
             &lights,
             technique,
-        );
+        )
+        .unwrap();
         graph.keep(frame.radiance);
         let compiled = graph.compile(&FakeMemory).unwrap();
         let plan = compiled.plan();
@@ -296,4 +297,39 @@ fn passes_that_nobody_reads_are_left_out() {
         json.contains("nothing can stand between the light"),
         "{json}"
     );
+}
+
+/// A host that forgot something gets an error, and its graph stays as it was.
+#[test]
+fn what_a_technique_cannot_do_without_is_an_error() {
+    let blocker = plate("blocker", [-2.0, 0.0], [-2.0, 2.0], 5.0);
+    let mut blocked = scene(vec![floor(), blocker], DISK);
+    for (technique, shape, reason) in [
+        ("ssoc", DISK, "call SceneBuffers::add_edges once"),
+        ("dbuffer", DISK, "`dbuffer` reads the scene's edges"),
+        (
+            "ssoc",
+            LightShape::Line { length: 1.0 },
+            "cannot do a line light; it does",
+        ),
+    ] {
+        blocked.lights[0].light.shape = shape;
+        let buffers = SceneBuffers::plan_only(&blocked, false);
+        let light = NamedLight {
+            name: "lamp".into(),
+            light: blocked.lights[0].light,
+        };
+        let mut graph = Graph::new();
+        let technique = technique.parse().unwrap();
+        let (camera, size) = (camera(), [SIZE; 2]);
+        let lights = [light];
+        let added = add_frame(&mut graph, &buffers, &camera, size, &lights, technique);
+        let error = added.unwrap_err().to_string();
+        assert!(
+            error.starts_with("light `lamp`: ") && error.contains(reason),
+            "{error}"
+        );
+        assert_eq!(error.lines().count(), 1, "{error}");
+        assert_eq!(graph.pass_count(), 0);
+    }
 }

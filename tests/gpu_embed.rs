@@ -140,7 +140,8 @@ fn a_host_records_the_same_frame() {
                 [SIZE; 2],
                 &lights,
                 Technique::Hard,
-            );
+            )
+            .unwrap();
             let enter = if number == 0 {
                 ImageState::UNDEFINED
             } else {

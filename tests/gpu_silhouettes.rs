@@ -167,7 +167,7 @@ fn found(scene: &Scene, light: AreaLight, rule: SilhouetteRule) -> Vec<Edge> {
                 size: bytes,
             },
         ),
-        receivers: Vec::new(),
+        receivers: [].into(),
         casters: vec![true; buffers.draws().len()].into(),
         scene: &buffers,
         ids,

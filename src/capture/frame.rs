@@ -6,7 +6,8 @@ use super::kept_edges::KeptSilhouettes;
 use crate::gpu::GpuError;
 use crate::graph::{FakeMemory, FrameReport, Graph, GraphError, Plan};
 use crate::renderer::{
-    Frame, NamedLight, SceneBuffers, UploadError, add_frame_with_masks, add_frame_with_silhouettes,
+    Frame, NamedLight, SceneBuffers, ShadowError, Survey, UploadError, add_frame, add_frame_of,
+    add_frame_with_masks,
 };
 use crate::scene::{Scene, SceneCamera};
 use crate::shadow::auto::Choice;
@@ -125,6 +126,9 @@ pub enum CaptureError {
     /// The scene cannot be uploaded.
     #[error("scene: {0}")]
     Upload(#[from] UploadError),
+    /// The shadows cannot be declared.
+    #[error(transparent)]
+    Shadow(#[from] ShadowError),
     /// The frame's graph is wrong.
     #[error("frame: {0}")]
     Graph(#[from] GraphError),
@@ -139,7 +143,8 @@ pub fn plan_frame(scene: &Scene, request: &FrameRequest) -> Result<Plan, Capture
     let lights = check(scene, request, 16384)?;
     let buffers = SceneBuffers::plan_only(scene, request.technique.reads_edges());
     let mut graph = Graph::new();
-    let frame = declare(&mut graph, &buffers, request, &lights, Earlier::default());
+    let (camera, size, technique) = (&request.camera, request.size, request.technique);
+    let frame = add_frame(&mut graph, &buffers, camera, size, &lights, technique)?;
     graph.keep(frame.radiance);
     for visibility in frame.visibility {
         graph.keep(visibility);
@@ -199,11 +204,12 @@ pub(super) fn check(
     lights.collect()
 }
 
-/// What earlier frames have made that fits.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Earlier<'k> {
-    pub(super) masks: Option<&'k KeptMasks>,
-    pub(super) silhouettes: Option<&'k KeptSilhouettes>,
+/// What a frame's shadows come from.
+pub(super) enum Shadows<'k> {
+    /// Masks of an earlier frame that fit.
+    Kept(&'k KeptMasks),
+    /// Techniques, with silhouettes of an earlier frame that fit.
+    Made(Survey, Option<&'k KeptSilhouettes>),
 }
 
 /// Declares the frame.
@@ -212,14 +218,21 @@ pub(super) fn declare<'f>(
     buffers: &'f SceneBuffers,
     request: &FrameRequest,
     lights: &[NamedLight],
-    earlier: Earlier<'_>,
-) -> Frame {
+    shadows: &Shadows<'_>,
+) -> Result<Frame, ShadowError> {
     let (camera, size) = (&request.camera, request.size);
-    if let Some(kept) = earlier.masks {
-        let masks = kept.import(graph);
-        return add_frame_with_masks(graph, buffers, camera, size, lights, masks);
+    match shadows {
+        Shadows::Kept(kept) => {
+            let masks = kept.import(graph);
+            let frame = add_frame_with_masks(graph, buffers, camera, size, lights, masks);
+            Ok(Frame {
+                choices: kept.choices().to_vec(),
+                ..frame
+            })
+        }
+        Shadows::Made(survey, kept) => {
+            let kept = kept.map(|kept| kept.import(graph)).unwrap_or_default();
+            add_frame_of(graph, buffers, camera, size, lights, survey, &kept)
+        }
     }
-    let kept = earlier.silhouettes.map(|kept| kept.import(graph));
-    let (technique, kept) = (request.technique, kept.unwrap_or_default());
-    add_frame_with_silhouettes(graph, buffers, camera, size, lights, technique, &kept)
 }

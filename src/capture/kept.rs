@@ -3,12 +3,15 @@
 use super::frame::FrameRequest;
 use crate::gpu::{Gpu, GpuError, Image, ImageSpec, Retired};
 use crate::graph::{Access, Graph, HostImage, ImageDesc, ImageId, ImageState, PassKind};
+use crate::renderer::Frame;
 use crate::shadow::ShadowMask;
+use crate::shadow::auto::Choice;
 use ash::vk;
 
 /// Masks of the lights of a request, on the device.
 pub(super) struct KeptMasks {
     request: FrameRequest,
+    choices: Vec<Choice>,
     masks: Vec<Kept>,
 }
 
@@ -35,14 +38,15 @@ impl KeptMasks {
     pub(super) fn new(
         gpu: &mut Gpu,
         request: &FrameRequest,
-        masks: &[ShadowMask],
+        frame: &Frame,
     ) -> Result<Self, GpuError> {
         let mut kept = Self {
             request: request.clone(),
-            masks: Vec::with_capacity(masks.len()),
+            choices: frame.choices.clone(),
+            masks: Vec::with_capacity(frame.masks.len()),
         };
         let [width, height] = request.size;
-        for mask in masks {
+        for mask in &frame.masks {
             let mut image = |name, format| {
                 gpu.create_image(name, &ImageSpec::new_2d(format, width, height, USAGE))
             };
@@ -69,6 +73,11 @@ impl KeptMasks {
             }
         }
         Ok(kept)
+    }
+
+    /// Each light's technique, and why.
+    pub(super) fn choices(&self) -> &[Choice] {
+        &self.choices
     }
 
     /// Whether they are those of a request, provided that the scene is the same.

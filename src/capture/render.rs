@@ -2,7 +2,7 @@
 
 use super::dump::{CapturedImage, Dump, Source};
 use super::frame::{
-    CaptureError, CapturedFrame, CapturedLight, Earlier, FrameRequest, check, declare,
+    CaptureError, CapturedFrame, CapturedLight, FrameRequest, Shadows, check, declare,
 };
 use super::kept::KeptMasks;
 use super::kept_edges::KeptSilhouettes;
@@ -11,10 +11,9 @@ use crate::graph::{
     Access, BufferDesc, BufferPart, BufferState, FrameCache, FrameReport, Graph, HostBuffer,
     ImagePart, PassKind, Plan,
 };
-use crate::renderer::{Frame, SceneBuffers, UploadError, choices};
+use crate::renderer::{Frame, SceneBuffers, Survey, UploadError};
 use crate::scene::Scene;
 use crate::shadow::Tally;
-use crate::shadow::auto::Choice;
 use ash::vk;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -161,44 +160,48 @@ impl<'s> FrameRenderer<'s> {
         let reuse = mode == Mode::Static;
         let most = self.gpu.info().limits.max_image_dimension2_d;
         let lights = check(&self.scene, request, most)?;
-        let choices = choices(
-            &self.buffers,
-            &request.camera,
-            request.size,
-            &lights,
-            request.technique,
-        );
-        let reads_edges = choices.iter().any(|choice| choice.technique.reads_edges());
+        let start = Instant::now();
+        let filled = reuse && self.kept_filled;
+        let kept = (self.kept.as_ref()).filter(|kept| filled && kept.fit(request));
+        let shadows = match kept {
+            Some(kept) => Shadows::Kept(kept),
+            None => {
+                let (camera, technique) = (&request.camera, request.technique);
+                let survey = Survey::new(&self.buffers, camera, request.size, &lights, technique)?;
+                let kept = self.kept_silhouettes.as_ref();
+                Shadows::Made(survey, kept.filter(|kept| filled && kept.fit(request)))
+            }
+        };
+        let (masks_kept, silhouettes_kept, reads_edges) = match &shadows {
+            Shadows::Kept(_) => (lights.len(), 0, false),
+            Shadows::Made(survey, kept) => {
+                let silhouettes = kept.map_or(0, KeptSilhouettes::count);
+                (0, silhouettes, survey.reads_edges())
+            }
+        };
+        // They stay for all frames of the scene.
+        let mut aside_ms = 0.0;
         if reads_edges && !self.buffers.has_edges() {
+            let aside = Instant::now();
             let (buffers, scene) = (&mut self.buffers, &*self.scene);
             let add = |gpu: &mut Gpu, cmd| buffers.add_edges(gpu, cmd, scene);
             if let Err(error) = self.gpu.run(add) {
                 self.buffers.forget_edges();
                 return Err(error.into());
             }
+            aside_ms += milliseconds(aside);
         }
 
-        let start = Instant::now();
         let pipelines = self.gpu.pipelines_created();
         let mut graph = Graph::continuing(self.cache.history());
-        let filled = reuse && self.kept_filled;
-        let kept_edges = self.kept_silhouettes.as_ref();
-        let earlier = Earlier {
-            masks: (self.kept.as_ref()).filter(|kept| filled && kept.fit(request)),
-            silhouettes: kept_edges.filter(|kept| filled && kept.fit(request)),
-        };
-        let (masks_kept, silhouettes_kept) = (
-            earlier.masks.map_or(0, |_| lights.len()),
-            earlier.silhouettes.map_or(0, KeptSilhouettes::count),
-        );
-        let frame = declare(&mut graph, &self.buffers, request, &lights, earlier);
+        let frame = declare(&mut graph, &self.buffers, request, &lights, &shadows)?;
         if reuse && masks_kept == 0 {
             // Until the device has filled them they fit nothing.
             self.kept_filled = false;
             if let Some(old) = self.kept.take() {
                 old.retire(&mut self.gpu);
             }
-            let kept = KeptMasks::new(&mut self.gpu, request, &frame.masks)?;
+            let kept = KeptMasks::new(&mut self.gpu, request, &frame)?;
             kept.fill(&mut graph, &frame.masks);
             self.kept = Some(kept);
             if silhouettes_kept == 0 {
@@ -216,7 +219,7 @@ impl<'s> FrameRenderer<'s> {
         let aside = Instant::now();
         let (usage, location) = (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu);
         let target = (self.gpu).create_buffer(READ_BACK, wanted.bytes, usage, location)?;
-        let aside_ms = milliseconds(aside);
+        aside_ms += milliseconds(aside);
 
         wanted.declare(&mut graph, &target);
         let recorded = run(&mut self.gpu, &mut self.cache, graph);
@@ -233,7 +236,7 @@ impl<'s> FrameRenderer<'s> {
             CapturedFrame {
                 size: request.size,
                 color: wanted.take(0, bytes),
-                lights: wanted.lights(request, choices, &frame, &plan, bytes),
+                lights: wanted.lights(request, &frame, &plan, bytes),
                 images: wanted.images(bytes),
                 counters: self.counters(&plan, &report, created, [masks_kept, silhouettes_kept]),
                 passes,
@@ -450,13 +453,12 @@ impl ReadBacks {
     fn lights(
         &self,
         request: &FrameRequest,
-        choices: Vec<Choice>,
         frame: &Frame,
         plan: &Plan,
         bytes: &[u8],
     ) -> Vec<CapturedLight> {
         let ranges = request.lights.iter().zip(&frame.visibility_passes);
-        let lights = ranges.zip(choices).enumerate();
+        let lights = ranges.zip(frame.choices.iter().cloned()).enumerate();
         let lights = lights.map(|(at, ((light, range), choice))| {
             let passes = plan.passes.iter();
             let own = passes.filter(|pass| range.contains(&pass.declared));

@@ -11,6 +11,7 @@
 //! | `shade.light`, for each light | all of the above | radiance, added |
 
 mod shade;
+mod survey;
 mod unlit;
 
 pub use crate::geometry::{
@@ -18,17 +19,18 @@ pub use crate::geometry::{
     frustum_sees, visible_hulls,
 };
 pub use shade::{Ambient, Shading, ShadingInputs, add_shading};
+pub use survey::{ShadowError, Survey, cases};
 pub use unlit::unlit;
 
 use crate::geometry::{add_gbuffer, add_tile_bounds};
 use crate::graph::{Access, BufferDesc, BufferId, BufferPart, Graph, ImageId, PassKind};
 use crate::light::AreaLight;
 use crate::scene::SceneCamera;
-use crate::shadow::auto::{Case, Choice, Table, choose};
+use crate::shadow::auto::Choice;
 use crate::shadow::silhouettes::Silhouettes;
-use crate::shadow::{LightParams, ShadowInputs, ShadowMask, Technique, ViewParams, casters};
+use crate::shadow::{LightParams, ShadowInputs, ShadowMask, Technique, ViewParams};
+use glam::DVec3;
 use std::ops::Range;
-use std::rc::Rc;
 
 /// A light with the name that its passes and files get.
 #[derive(Clone, Debug)]
@@ -77,8 +79,9 @@ pub struct Visibilities {
 /// [`add_gbuffer`], or a host's own with the same meaning. `ids` is what
 /// [`SceneBuffers::import`] returned for this graph.
 ///
-/// # Panics
-/// If the technique reads edges and the scene has none yet ([`SceneBuffers::add_edges`]).
+/// # Errors
+/// [`ShadowError::Technique`] if the technique cannot do a light, [`ShadowError::NoEdges`] if it reads
+/// edges and the scene has none yet ([`SceneBuffers::add_edges`]). Nothing is declared then.
 pub fn add_visibility<'f>(
     graph: &mut Graph<'f>,
     (scene, ids): (&'f SceneBuffers, SceneIds),
@@ -87,32 +90,31 @@ pub fn add_visibility<'f>(
     size: [u32; 2],
     lights: &[NamedLight],
     technique: Technique,
-) -> Visibilities {
-    let surfaces = (gbuffer, camera, size);
-    visibilities(graph, (scene, ids), surfaces, lights, technique, &[])
+) -> Result<Visibilities, ShadowError> {
+    let survey = Survey::new(scene, camera, size, lights, technique)?;
+    survey.check_edges(scene, lights)?;
+    let surfaces = (gbuffer, PixelCamera::new(camera, size));
+    Ok(visibilities(
+        graph,
+        (scene, ids),
+        surfaces,
+        lights,
+        &survey,
+        &[],
+    ))
 }
 
 fn visibilities<'f>(
     graph: &mut Graph<'f>,
     (scene, ids): (&'f SceneBuffers, SceneIds),
-    (gbuffer, camera, size): (GBuffer, &SceneCamera, [u32; 2]),
+    (gbuffer, pixels): (GBuffer, PixelCamera),
     lights: &[NamedLight],
-    technique: Technique,
+    survey: &Survey,
     silhouettes: &[Option<Silhouettes>],
 ) -> Visibilities {
-    let pixels = PixelCamera::new(camera, size);
     let (params, parts) = add_params(graph, pixels, lights);
-    let tile_bounds = add_tile_bounds(graph, &gbuffer, size);
-    // Boxes that turn with the triangles grow less around what is turned.
-    let boxes = scene.draws().iter().map(|draw| draw.corners);
-    let receivers = visible_hulls(camera, size, boxes, scene.covers());
-    let casters_of = |light: &NamedLight| casters(&light.light, &receivers, scene);
-    let casters: Vec<Rc<[bool]>> = lights.iter().map(casters_of).collect();
-    let choices = chosen(lights, technique, || {
-        let both = lights.iter().zip(&casters);
-        both.map(|(named, casters)| Case::new(&named.light, casters, scene, size))
-            .collect()
-    });
+    let tile_bounds = add_tile_bounds(graph, &gbuffer, pixels.size());
+    let choices = survey.choices();
     let mut masks = Vec::with_capacity(lights.len());
     let mut passes = Vec::with_capacity(lights.len());
     for (at, (light, part)) in lights.iter().zip(&parts).enumerate() {
@@ -126,8 +128,8 @@ fn visibilities<'f>(
                 gbuffer,
                 tile_bounds,
                 view_params: (params, *part),
-                receivers: receivers.clone(),
-                casters: casters[at].clone(),
+                receivers: survey.receivers.clone(),
+                casters: survey.casters[at].clone(),
                 scene,
                 ids,
                 silhouettes: silhouettes.get(at).copied().flatten(),
@@ -138,56 +140,15 @@ fn visibilities<'f>(
     Visibilities {
         masks,
         passes,
-        choices,
+        choices: choices.to_vec(),
         params,
         parts,
     }
 }
 
-/// What [`add_visibility`] and [`add_frame`] do for each light: `technique` itself, or what
-/// [`Technique::Auto`] chooses.
-#[must_use]
-pub fn choices(
-    scene: &SceneBuffers,
-    camera: &SceneCamera,
-    size: [u32; 2],
-    lights: &[NamedLight],
-    technique: Technique,
-) -> Vec<Choice> {
-    chosen(lights, technique, || cases(scene, camera, size, lights))
-}
-
-/// What [`Technique::Auto`] goes by, for each light.
-#[must_use]
-pub fn cases(
-    scene: &SceneBuffers,
-    camera: &SceneCamera,
-    size: [u32; 2],
-    lights: &[NamedLight],
-) -> Vec<Case> {
-    let boxes = scene.draws().iter().map(|draw| draw.corners);
-    let receivers = visible_hulls(camera, size, boxes, scene.covers());
-    let case = |named: &NamedLight| {
-        let casters = casters(&named.light, &receivers, scene);
-        Case::new(&named.light, &casters, scene, size)
-    };
-    lights.iter().map(case).collect()
-}
-
-fn chosen(
-    lights: &[NamedLight],
-    technique: Technique,
-    cases: impl FnOnce() -> Vec<Case>,
-) -> Vec<Choice> {
-    match technique {
-        Technique::Auto(options) => choose(Table::reference(), &cases(), &options),
-        technique => vec![Choice::asked(technique); lights.len()],
-    }
-}
-
 /// Declares a picture of `size` pixels: surfaces, visibility of every light, shading.
 ///
-/// # Panics
+/// # Errors
 /// As [`add_visibility`].
 pub fn add_frame<'f>(
     graph: &mut Graph<'f>,
@@ -196,34 +157,40 @@ pub fn add_frame<'f>(
     size: [u32; 2],
     lights: &[NamedLight],
     technique: Technique,
-) -> Frame {
-    add_frame_with_silhouettes(graph, scene, camera, size, lights, technique, &[])
+) -> Result<Frame, ShadowError> {
+    let survey = Survey::new(scene, camera, size, lights, technique)?;
+    add_frame_of(graph, scene, camera, size, lights, &survey, &[])
 }
 
-/// As [`add_frame`], with the lists of silhouettes of an earlier frame, in which lights, scene and
-/// technique were the same, for the lights that have one ([`ShadowMask::silhouettes`]): those lights
-/// search for none. `silhouettes` are of this graph.
-pub fn add_frame_with_silhouettes<'f>(
+/// As [`add_frame`], of a survey of the same scene, camera, size and lights. For the lights that
+/// `silhouettes` has lists for, of an earlier frame ([`ShadowMask::silhouettes`]) in which lights, scene
+/// and technique were the same, none are searched for; they are of this graph.
+///
+/// # Errors
+/// [`ShadowError::NoEdges`].
+pub fn add_frame_of<'f>(
     graph: &mut Graph<'f>,
     scene: &'f SceneBuffers,
     camera: &SceneCamera,
     size: [u32; 2],
     lights: &[NamedLight],
-    technique: Technique,
+    survey: &Survey,
     silhouettes: &[Option<Silhouettes>],
-) -> Frame {
+) -> Result<Frame, ShadowError> {
+    survey.check_edges(scene, lights)?;
     let ids = scene.import(graph);
     let gbuffer = add_gbuffer(graph, scene, &ids, camera, size);
-    let surfaces = (gbuffer, camera, size);
-    let found = visibilities(
+    let pixels = PixelCamera::new(camera, size);
+    let surfaces = (gbuffer, pixels);
+    let found = visibilities(graph, (scene, ids), surfaces, lights, survey, silhouettes);
+    let in_view = &survey.receivers;
+    Ok(shaded(
         graph,
-        (scene, ids),
+        (scene, &ids),
         surfaces,
-        lights,
-        technique,
-        silhouettes,
-    );
-    shaded(graph, (scene, &ids), gbuffer, camera, lights, found)
+        (lights, in_view),
+        found,
+    ))
 }
 
 /// As [`add_frame`], with what a technique made of the lights in an earlier frame, in which camera,
@@ -239,7 +206,8 @@ pub fn add_frame_with_masks<'f>(
 ) -> Frame {
     let ids = scene.import(graph);
     let gbuffer = add_gbuffer(graph, scene, &ids, camera, size);
-    let (params, parts) = add_params(graph, PixelCamera::new(camera, size), lights);
+    let pixels = PixelCamera::new(camera, size);
+    let (params, parts) = add_params(graph, pixels, lights);
     let none = graph.pass_count();
     let found = Visibilities {
         passes: vec![none..none; masks.len()],
@@ -248,22 +216,20 @@ pub fn add_frame_with_masks<'f>(
         params,
         parts,
     };
-    shaded(graph, (scene, &ids), gbuffer, camera, lights, found)
+    let in_view = survey::receivers(scene, camera, size);
+    let surfaces = (gbuffer, pixels);
+    shaded(graph, (scene, &ids), surfaces, (lights, &in_view), found)
 }
 
+/// `in_view` are convex hulls of what the picture can show.
 fn shaded<'f>(
     graph: &mut Graph<'f>,
     (scene, ids): (&'f SceneBuffers, &SceneIds),
-    gbuffer: GBuffer,
-    camera: &SceneCamera,
-    lights: &[NamedLight],
+    (gbuffer, camera): (GBuffer, PixelCamera),
+    (lights, in_view): (&[NamedLight], &[Vec<DVec3>]),
     found: Visibilities,
 ) -> Frame {
-    let size = graph.image_desc(gbuffer.view_depth);
-    let size = size.map_or([1, 1], |desc| [desc.width, desc.height]);
-    let boxes = scene.draws().iter().map(|draw| draw.corners);
-    let receivers = visible_hulls(camera, size, boxes, scene.covers());
-    let unlit = lights.iter().map(|named| unlit(&named.light, &receivers));
+    let unlit = lights.iter().map(|named| unlit(&named.light, in_view));
     let unlit: Vec<_> = unlit.collect();
     let shading = add_shading(
         graph,
@@ -271,7 +237,7 @@ fn shaded<'f>(
             scene,
             ids,
             gbuffer: &gbuffer,
-            camera: PixelCamera::new(camera, size),
+            camera,
             lights,
             masks: &found.masks,
             params: found.params,

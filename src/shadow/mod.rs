@@ -48,7 +48,7 @@ pub struct ShadowInputs<'f> {
     pub view_params: (BufferId, BufferPart),
     /// Convex hulls of what the picture can show: all pixels' surfaces lie in one of them. Scene
     /// space, metres.
-    pub receivers: Vec<Vec<DVec3>>,
+    pub receivers: Rc<[Vec<DVec3>]>,
     /// For each of the scene's draws, whether it can block any of the light from any receiver.
     pub casters: Rc<[bool]>,
     /// All triangles.

@@ -179,7 +179,7 @@ impl Shadows {
             size,
             lights,
             self.technique,
-        );
+        )?;
         let visibility = found.masks[0].visibility;
         let mut pass = graph.pass("host.copy", PassKind::Transfer);
         pass.read(visibility, Access::CopyRead);

@@ -3,6 +3,8 @@
 
 mod support;
 
+#[path = "capture_shaft/bounds.rs"]
+mod bounds;
 #[path = "capture_shaft/refine.rs"]
 mod refine;
 
@@ -104,13 +106,18 @@ fn cast(
 fn check(name: &str, side: u32) {
     let scene = load(name);
     let camera = scene.select_camera(None).unwrap();
+    check_scene(name, (&scene, &camera), side, 1000);
+}
+
+/// `least`: pixels that can be compared.
+fn check_scene(name: &str, (scene, camera): (&Scene, &SceneCamera), side: u32, least: u32) {
     let samples = side * side;
     let technique = format!("shaft-masks:samples={samples},target-error=none");
-    let images = render(&scene, &camera, &[&technique]);
-    let reference = Reference::new(&scene).unwrap();
+    let images = render(scene, camera, &[&technique]);
+    let reference = Reference::new(scene).unwrap();
     let (images, surfaces) = &images[0];
     for (image, light) in images.iter().zip(&scene.lights) {
-        let (truth, valid) = cast(&reference, &camera, &light.light, side);
+        let (truth, valid) = cast(&reference, camera, &light.light, side);
         let (mut pixels, mut partly, mut bits, mut off, mut others) = (0, 0, 0.0, 0, 0);
         for (index, (v, truth)) in image.iter().zip(&truth).enumerate() {
             if !valid[index] {
@@ -122,7 +129,7 @@ fn check(name: &str, side: u32) {
                 continue;
             }
             let pixel = UVec2::new(index as u32 % SIZE[0], index as u32 / SIZE[0]);
-            let surface = reference.surface(&camera, SIZE, pixel).unwrap();
+            let surface = reference.surface(camera, SIZE, pixel).unwrap();
             if surfaces.is_other(index, &surface) {
                 others += 1;
                 continue;
@@ -137,11 +144,11 @@ fn check(name: &str, side: u32) {
             light.name,
             light.light.shape.kind(),
         );
-        assert!(pixels > 1000, "{name}: there is something to measure");
+        assert!(pixels > least, "{name}: there is something to measure");
         assert!(part <= MOST, "{name}, `{}`: {part}", light.name);
         // The fewer sub-texel steps, the more centres lie within one of an edge: 0.1 % of pixels at
         // 256 steps, 0.4 % at SwiftShader's 16, among them all wires of the fences.
-        let bits = with_renderer(&scene, |renderer| {
+        let bits = with_renderer(scene, |renderer| {
             renderer.gpu().info().limits.sub_pixel_precision_bits
         });
         let most = f64::from(pixels) * (8.0e-4 + 0.0512 / f64::from(1_u32 << bits.min(16)));
@@ -170,6 +177,26 @@ fn masks_are_those_of_rays() {
     }
     check("mirrored.gltf", 16);
     check("sphere_over_plane.gltf", 32);
+}
+
+/// The other scenes, and the hard ones.
+#[test]
+#[ignore = "takes minutes: cargo test --release --test capture_shaft -- --ignored"]
+fn masks_are_those_of_rays_on_all_scenes() {
+    let _one = support::serial();
+    for name in [
+        "blockers.gltf",
+        "comb.gltf",
+        "poles.gltf",
+        "sun_court.glb",
+        "tube.gltf",
+    ] {
+        check(name, 8);
+        check(name, 16);
+    }
+    for case in antumbra::stress::cases() {
+        check_scene(&case.name, (&case.scene, &case.camera), 8, 0);
+    }
 }
 
 #[test]
@@ -340,4 +367,40 @@ fn no_bound_is_exceeded_on_closed_forms() {
             assert!(partly > 500);
         }
     }
+}
+
+/// Another technique's picture with tiles settled: rays are right about most of these already, and
+/// where the pictures differ the settled one is right.
+#[test]
+fn settled_tiles_serve_other_techniques() {
+    let _one = support::serial();
+    let scene = load("sphere_over_plane.gltf");
+    let camera = scene.select_camera(None).unwrap();
+    let techniques = ["mdi", "mdi:classes=on", "shaft-masks:target-error=none"];
+    let images = render(&scene, &camera, &techniques);
+    let [without, with, masks] = [0, 1, 2].map(|at| &images[at].0[0]);
+    let mut settled = 0;
+    for (i, (v, before)) in with.iter().zip(without).enumerate() {
+        if v != before {
+            settled += 1;
+            assert_eq!(*v, masks[i], "pixel {i}");
+            assert!(*v == 0.0 || *v == 1.0, "pixel {i}");
+        }
+    }
+    println!("{settled} pixels differ");
+    let traced = |technique: &str| {
+        let request = FrameRequest {
+            camera: camera.clone(),
+            size: SIZE,
+            lights: vec![0],
+            technique: technique.parse().unwrap(),
+        };
+        let frame = with_renderer(&scene, |renderer| {
+            renderer.render_counted(&request).unwrap()
+        });
+        frame.lights[0].counters["pixels_traced"]
+    };
+    let [all, few] = [traced("mdi"), traced("mdi:classes=on")];
+    // Most of the lit ones need no ray anyway.
+    assert!(few > 0 && few < all, "{few} of {all}");
 }

@@ -1,4 +1,5 @@
 #version 460
+#extension GL_EXT_control_flow_attributes : require
 // How far a pixel's visibility can be off: the part of the light's cells that are undecided.
 //
 // Each sample stands for a cell of the light, and all cells are as large. A cell that the border of no

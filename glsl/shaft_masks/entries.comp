@@ -1,6 +1,7 @@
 #version 460
-// Entries for the masks of each tile, from its candidates: a workgroup each. A tile with a triangle between
-// all of it and all of the light is dark and settled here.
+#extension GL_EXT_control_flow_attributes : require
+// Entries for the masks of each tile, from its candidates: a workgroup each. Tiles that turn out to be lit or dark
+// as a whole are settled here, the others listed.
 //
 // Triangles that are between all surfaces and the light's plane and show one side to all surfaces are counted
 // by their edges. Seen from a surface each goes round its samples once, so that a sample's number of
@@ -9,6 +10,9 @@
 // open, folded and many-sided edges need no rule of their own, and any triangle may be left to the
 // others, which are drawn one by one. Silhouette edges in this sense: Laine and others 2005, "Soft Shadow
 // Volumes for Ray Tracing".
+//
+// Where none of these edges meets the shaft, the number is the same for every surface and every sample: of any one
+// segment it tells whether the tile is dark. So is a tile with another triangle between all of it and all of the light.
 
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
@@ -16,7 +20,7 @@
 #include "shaft_masks/lists.glsl"
 #include "shaft_masks/sides.glsl"
 
-layout(local_size_x = 32) in;
+layout(local_size_x = 8) in; // one vector: a lane without a candidate costs as much as one with
 
 layout(set = 0, binding = 0, std140) uniform ViewBlock {
     ViewParams view;
@@ -24,7 +28,6 @@ layout(set = 0, binding = 0, std140) uniform ViewBlock {
 layout(set = 0, binding = 1, std140) uniform ShaftBlock {
     ShaftParams params;
 };
-layout(set = 0, binding = 2) uniform sampler2D tile_bounds;
 layout(set = 0, binding = 3) uniform sampler2D triangles;
 layout(set = 0, binding = 4) uniform usampler2D neighbours;
 layout(set = 0, binding = 5, std140) uniform Arguments {
@@ -58,21 +61,38 @@ layout(set = 0, binding = 19, std430) buffer PiecesArguments {
 };
 layout(set = 0, binding = 20, r32ui) uniform writeonly uimage2D pieces_list;
 layout(set = 0, binding = 21, r32ui) uniform writeonly uimage2D estimates;
+// Those that masks are made of.
+layout(set = 0, binding = 22, std430) buffer OpenArguments {
+    TileArguments open_tiles;
+};
+layout(set = 0, binding = 2, r32ui) uniform writeonly uimage2D open_list;
 
-// Pairs of corners that an invocation looks at to find a dark tile.
-const uint MOST_LOOKS = 256u;
+#define SUN_TANGENT_SQUARE (view.light.axis_x.w * view.light.axis_x.w)
+
+#include "shaft_masks/masks.glsl"
+
+// Triangles that are looked at as ones that may cover all of the light.
+const uint MOST_COVERS = 8u;
 
 const uint NO_NEIGHBOUR = 0xffffffffu;
 const uint MOST_EDGES = MOST_COUNT;
 
 shared uint staged[MOST_EDGES];
 shared uint edge_count;
+shared uint meeting_edges; // that meet the shaft
 shared uint count_sum;
 shared uint whole_count;
 shared uint other_count;
 shared uint first_triangle;
 shared uint first_edge;
-shared uint is_dark;
+shared int rounds; // that counted triangles go round one segment
+// Counted triangles of a chunk, times two, plus one for those seen from behind. Chunks take turns, so that a lane
+// may begin the next one while others are at this one.
+shared uint counted[2u][CHUNK];
+shared uint counted_count[3u];
+shared uint covers[MOST_COVERS];
+shared uint cover_count;
+shared uint seen_corners[MOST_COVERS]; // pairs of corners that do not see each other
 
 vec4 fetch_triangle_texel(uint texel) {
     return texelFetch(triangles, triangle_texel_place(texel), 0);
@@ -84,6 +104,19 @@ vec4 fetch_node_texel(ivec2 place) {
 
 vec4 fetch_shaft_texel(ivec2 place) {
     return texelFetch(shafts, place, 0);
+}
+
+// Nothing is fetched from these here.
+vec4 fetch_material_texel(ivec2 place) {
+    return vec4(0.0);
+}
+
+vec4 fetch_uv_texel(ivec2 place) {
+    return vec4(0.0);
+}
+
+vec4 fetch_texture_texel(ivec2 place) {
+    return vec4(0.0);
 }
 
 struct Triangle {
@@ -134,68 +167,80 @@ bool sees_through(vec3 p, vec3 l, Triangle t, float margin_m) {
     return between && all(greaterThan(turn * edges, margins));
 }
 
-// Whether the triangle is between all of the tile and all of the light: sides of edges are bilinear in
-// the two ends of a segment, so corners decide.
-bool covers(uvec2 tile, TileBounds bounds, mat3 frame, Triangle t, inout uint looks) {
-    vec3 p = tile_corner(view.camera, tile, bounds, 0u);
-    vec3 extent = max(abs(t.corners[0]), max(abs(p), LIGHT_SHAPE == LIGHT_SUN ? vec3(0.0) : abs(view.light.center.xyz)));
-    float margin_m = POSITION_ROUNDING * max(extent.x, max(extent.y, extent.z));
-    bool all_through = !material_is_masked(t.plane.w) && looks + 64u <= MOST_LOOKS
-        && sees_through(p, view.light.center.xyz, t, margin_m);
-    for (uint i = 0u; i < 64u && all_through; ++i) {
-        p = tile_corner(view.camera, tile, bounds, i & 7u);
-        looks += 1u;
-        all_through = sees_through(p, light_corner(view.light, frame, i >> 3), t, margin_m);
-    }
-    return all_through;
+float cover_margin_m(Surfaces surfaces, Triangle t) {
+    vec3 extent = max(abs(t.corners[0]),
+        max(abs(surfaces.center), LIGHT_SHAPE == LIGHT_SUN ? vec3(0.0) : abs(view.light.center.xyz)));
+    return POSITION_ROUNDING * max(extent.x, max(extent.y, extent.z));
 }
 
-// Whether an edge is beyond the samples on the side that edges count towards, or beyond the ends of
-// all rows, seen from every surface.
-bool is_beyond(Shaft shaft, vec3 a, vec3 b) {
+// Corner 0 to 7 of the box around the surfaces.
+vec3 surfaces_corner(Surfaces surfaces, uint corner) {
+    vec3 side = vec3(uvec3(corner, corner >> 1, corner >> 2) & 1u) * 2.0 - 1.0;
+    return surfaces.center + side.x * surfaces.axes[0] + side.y * surfaces.axes[1] + side.z * surfaces.axes[2];
+}
+
+// Stages an edge: one that is beyond the samples on the side that edges count towards, or beyond the ends of
+// all rows, seen from every surface, is left out.
+void stage_edge(Shaft shaft, vec3 a, vec3 b, uint code) {
     bool beyond = false;
+    bool outside = false;
     // The rows of a sphere's disk turn a little from pixel to pixel, and those of a rectangle rise: what is below it
     // may cross them before their first sample.
     uint last = LIGHT_SHAPE == LIGHT_SPHERE ? 1u : LIGHT_SHAPE == LIGHT_RECT ? 3u : 4u;
-    for (uint i = 0u; i < last; ++i) {
+    for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         vec4 plane = shaft.planes[i];
-        beyond = beyond || (i != 1u && dot(plane.xyz, a) > plane.w && dot(plane.xyz, b) > plane.w);
+        bool both = dot(plane.xyz, a) > plane.w && dot(plane.xyz, b) > plane.w;
+        outside = outside || both;
+        beyond = beyond || (both && i != 1u && i < last);
     }
-    return beyond;
-}
-
-void stage_edge(uint triangle, uint corner, uint side, bool twice) {
-    uint at = atomicAdd(edge_count, 1u);
-    atomicAdd(count_sum, twice ? 2u : 1u);
-    if (at < MOST_EDGES) {
-        staged[at] = triangle << EDGE_CORNER_BITS | corner | (twice ? EDGE_DOUBLE : 0u)
-            | (side == SIDE_BACK ? EDGE_TURNED : 0u);
-    }
-}
-
-void add_edges(Shaft shaft, Surfaces surfaces, uint triangle, Triangle t, uint side) {
-    uvec4 beside = texelFetch(neighbours, triangle_texel_place(triangle), 0);
-    for (uint corner = 0u; corner < 3u; ++corner) {
-        bool open = beside[corner] == NO_NEIGHBOUR;
-        uint other = open ? triangle : beside[corner] >> 1;
-        Triangle neighbour = fetch_triangle(other);
-        uint other_side = open || !meets(shaft, neighbour) ? SIDE_UNSURE : counted_side(surfaces, neighbour);
-        bool alike = (beside[corner] & 1u) == 0u;
-        bool counted = other_side != SIDE_UNSURE;
-        bool goes_on = counted && (other_side == side) == alike;
-        // Both sides of a fold count the same way: the first of the two adds it.
-        bool fold = counted && !goes_on;
-        bool adds = !goes_on && !(fold && other < triangle);
-        if (adds && !is_beyond(shaft, t.corners[corner], t.corners[corner == 2u ? 0u : corner + 1u])) {
-            stage_edge(triangle, corner, side, fold);
+    if (!beyond) {
+        uint at = atomicAdd(edge_count, 1u);
+        atomicAdd(count_sum, (code & EDGE_DOUBLE) != 0u ? 2u : 1u);
+        if (!outside) {
+            meeting_edges = 1u;
+        }
+        if (at < MOST_EDGES) {
+            staged[at] = code;
         }
     }
 }
 
+// The edge of a counted triangle that begins at a corner.
+void add_edge(Shaft shaft, Surfaces surfaces, uint triangle, uint corner, uint side) {
+    uint beside = texelFetch(neighbours, triangle_texel_place(triangle), 0)[corner];
+    vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
+    vec3 b = fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
+    bool alone = beside == NO_NEIGHBOUR;
+    uint other = alone ? triangle : beside >> 1;
+    Triangle neighbour = fetch_triangle(other);
+    uint other_side = alone || !meets(shaft, neighbour) ? SIDE_UNSURE : counted_side(surfaces, neighbour);
+    bool alike = (beside & 1u) == 0u;
+    bool both = other_side != SIDE_UNSURE;
+    bool goes_on = both && (other_side == side) == alike;
+    // Both sides of a fold count the same way: the first of the two adds it.
+    bool fold = both && !goes_on;
+    if (!goes_on && !(fold && other < triangle)) {
+        uint code = triangle << EDGE_CORNER_BITS | corner | (fold ? EDGE_DOUBLE : 0u);
+        stage_edge(shaft, a, b, code | (side == SIDE_BACK ? EDGE_TURNED : 0u));
+    }
+}
+
+// What a staged edge adds to the number of triangles between a receiver and the middle of the light.
+int edge_rounds(Projection projection, uint code) {
+    uint triangle = (code & ~(EDGE_DOUBLE | EDGE_TURNED)) >> EDGE_CORNER_BITS;
+    uint corner = code & ((1u << EDGE_CORNER_BITS) - 1u);
+    vec2 a = project(projection, fetch_triangle_texel(4u * triangle + corner).xyz);
+    vec2 b = project(projection, fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz);
+    Side side = side_between(a, b);
+    bool before = side.low.y <= 0.0 && 0.0 < side.high && side.low.x - side.low.y * side.slope < 0.0;
+    bool ends = (a.y < b.y) == (((code & EDGE_TURNED) != 0u) == projection.turned);
+    int step = (code & EDGE_DOUBLE) != 0u ? 2 : 1;
+    return before ? (ends ? -step : step) : 0;
+}
+
 void main() {
     uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
-    // The masks have a workgroup for each block of samples, this has one.
-    if (index >= arguments.count || gl_WorkGroupID.z > 0u) {
+    if (index >= arguments.count) {
         return;
     }
     uvec2 size = params.counts.xy;
@@ -208,76 +253,116 @@ void main() {
     uvec4 candidates = imageLoad(lists, list_place(part));
     if (lane == 0u) {
         edge_count = 0u;
+        meeting_edges = 0u;
         count_sum = 0u;
         whole_count = 0u;
         other_count = 0u;
-        is_dark = 0u;
+        rounds = 0;
+        counted_count[0] = 0u;
+        cover_count = 0u;
         first_triangle = atomicAdd(triangles_used, candidates.y);
     }
+    seen_corners[lane] = 0u;
     barrier();
 
-    ivec2 place = ivec2(tile.x * TILE_TEXELS, tile.y);
-    TileBounds bounds = tile_bounds_of(texelFetch(tile_bounds, place, 0),
-        texelFetch(tile_bounds, place + ivec2(1, 0), 0), texelFetch(tile_bounds, place + ivec2(2, 0), 0));
     Shaft shaft = fetch_shaft(part);
     Surfaces surfaces = fetch_surfaces(part, view.light);
-    mat3 frame = light_frame(view.light, tile_corner(view.camera, tile, bounds, 0u));
+    vec3 some = fetch_some_surface(part);
     uint last = first_triangle + candidates.y - 1u;
-    uint looks = 0u;
     uint chunk = candidates.x;
+    uint turn = 0u;
     for (uint begin = 0u; begin < candidates.y; begin += CHUNK) {
-        if (lane < min(CHUNK, candidates.y - begin)) {
-            uint triangle = texelFetch(pool, chunk_entry_place(chunk, lane), 0).x;
+        uint end = min(CHUNK, candidates.y - begin);
+        for (uint i = lane; i < end; i += gl_WorkGroupSize.x) {
+            uint triangle = texelFetch(pool, chunk_entry_place(chunk, i), 0).x;
             Triangle t = fetch_triangle(triangle);
             if (meets(shaft, t)) {
-                uint side = counted_side(surfaces, t);
-                if (covers(tile, bounds, frame, t, looks)) {
-                    is_dark = 1u;
-                }
+                bool between = is_whole(surfaces, t);
+                uint side = between ? triangle_side(surfaces, t.corners[0], t.plane.xyz) : SIDE_UNSURE;
                 bool hides = !is_below(surfaces, t.corners[0], t.corners[1], t.corners[2])
                     && !is_beyond_light(surfaces, t.corners[0], t.corners[1], t.corners[2]);
                 if (side != SIDE_UNSURE) {
-                    add_edges(shaft, surfaces, triangle, t, side);
-                } else if (hides && is_whole(surfaces, t)) {
+                    uint at = atomicAdd(counted_count[turn % 3u], 1u);
+                    counted[turn % 2u][at] = triangle << 1 | (side == SIDE_BACK ? 1u : 0u);
+                } else if (hides && between) {
                     uint at = first_triangle + atomicAdd(whole_count, 1u);
                     imageStore(triangle_pool, triangle_texel_place(at), uvec4(triangle));
                 } else if (hides) {
                     uint at = last - atomicAdd(other_count, 1u);
                     imageStore(triangle_pool, triangle_texel_place(at), uvec4(triangle));
                 }
+                float margin_m = cover_margin_m(surfaces, t);
+                if (!material_is_masked(t.plane.w) && sees_through(some, view.light.center.xyz, t, margin_m)) {
+                    uint cover = atomicAdd(cover_count, 1u);
+                    if (cover < MOST_COVERS) {
+                        covers[cover] = triangle;
+                    }
+                }
             }
         }
+        if (lane == 0u) {
+            counted_count[(turn + 1u) % 3u] = 0u;
+        }
+        barrier();
+        uint corners = 3u * counted_count[turn % 3u];
+        for (uint i = lane; i < corners; i += gl_WorkGroupSize.x) {
+            uint code = counted[turn % 2u][i / 3u];
+            add_edge(shaft, surfaces, code >> 1, i % 3u, (code & 1u) != 0u ? SIDE_BACK : SIDE_FRONT);
+        }
         chunk = texelFetch(pool, chunk_entry_place(chunk, CHUNK), 0).x;
+        turn += 1u;
     }
     barrier();
 
-    uint edges = edge_count;
-    if (lane == 0u) {
-        first_edge = atomicAdd(edges_used, count_sum <= MOST_COUNT ? edges : 0u);
+    // A list that ends early is not used: an edge between a triangle in the list and one that found no room in it
+    // counts for neither.
+    bool complete = candidates.z == params.counts.z && count_sum <= MOST_COUNT;
+    bool same = complete && meeting_edges == 0u;
+    Projection projection = projection_from(MaskReceiver(some, 0u, true), 0.0);
+    for (uint i = lane; i < edge_count && same; i += gl_WorkGroupSize.x) {
+        atomicAdd(rounds, edge_rounds(projection, staged[i]));
+    }
+    // Whether a triangle is between all surfaces and all of the light: sides of its edges are bilinear in the two ends
+    // of a segment, so corners decide.
+    uint pairs = 64u * min(cover_count, MOST_COVERS);
+    mat3 frame = light_frame(view.light, some);
+    for (uint i = lane; i < pairs; i += gl_WorkGroupSize.x) {
+        Triangle t = fetch_triangle(covers[i / 64u]);
+        vec3 p = surfaces_corner(surfaces, i & 7u);
+        if (!sees_through(p, light_corner(view.light, frame, i >> 3 & 7u), t, cover_margin_m(surfaces, t))) {
+            seen_corners[i / 64u] = 1u;
+        }
     }
     barrier();
-    // Without room for its edges a tile is looked at as if nothing was known of it. So is one whose list
-    // ends early: an edge between a triangle in the list and one that found no room in it counts for neither.
-    bool fits = candidates.z == params.counts.z && count_sum <= MOST_COUNT
-        && first_edge + edges <= params.pattern.z;
-    for (uint i = lane; i < edges && fits; i += gl_WorkGroupSize.x) {
+    bool dark = same && rounds != 0;
+    for (uint i = 0u; i < min(cover_count, MOST_COVERS); ++i) {
+        dark = dark || seen_corners[i] == 0u;
+    }
+    uint edges = same ? 0u : edge_count;
+    bool lit = complete && !dark && edges + whole_count + other_count == 0u && shaft.low.w > 0.0;
+    bool settled = dark || lit;
+    if (lane == 0u) {
+        first_edge = atomicAdd(edges_used, complete && !settled ? edges : 0u);
+    }
+    barrier();
+    // Without room for its edges a tile is looked at as if nothing was known of it.
+    bool fits = complete && first_edge + edges <= params.pattern.z;
+    for (uint i = lane; i < edges && fits && !settled; i += gl_WorkGroupSize.x) {
         imageStore(edge_pool, triangle_texel_place(first_edge + i), uvec4(staged[i]));
     }
     uint whole = fits ? whole_count : 0u;
     uint others = fits ? other_count : 0u;
     uint resume = fits ? params.counts.z : 0u;
-    bool dark = is_dark != 0u;
     vec2 depths = fetch_part_depths(part);
-    bool partly = resume < params.counts.z && !dark;
-    for (uint i = lane; i < TILE_SIZE * TILE_SIZE && dark; i += gl_WorkGroupSize.x) {
+    for (uint i = lane; i < TILE_SIZE * TILE_SIZE && settled; i += gl_WorkGroupSize.x) {
         // Stores beyond the picture's border are dropped.
         uvec2 pixel = tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);
         float depth = texelFetch(view_depth, ivec2(min(pixel, size - 1u)), 0).x;
         if (is_in_part(depths, depth)) {
-            imageStore(visibility, ivec2(pixel), vec4(depth > 0.0 ? 0.0 : 1.0));
+            imageStore(visibility, ivec2(pixel), vec4(depth > 0.0 && dark ? 0.0 : 1.0));
         }
     }
-    for (uint i = (lane + 1u) * TASK_ENTRIES; i < whole + others && !dark; i += gl_WorkGroupSize.x * TASK_ENTRIES) {
+    for (uint i = (lane + 1u) * TASK_ENTRIES; i < whole + others && !settled; i += gl_WorkGroupSize.x * TASK_ENTRIES) {
         uint task = atomicAdd(further.count, 1u);
         atomicMax(further.groups_x, min(task + 1u, TILE_ROW));
         atomicMax(further.groups_y, task / TILE_ROW + 1u);
@@ -285,19 +370,27 @@ void main() {
     }
     if (lane == 0u) {
         ivec2 at = list_place(part);
-        imageStore(lists, at, uvec4(candidates.xy, resume, dark ? TILE_SETTLED : TILE_OPEN));
+        imageStore(lists, at, uvec4(candidates.xy, resume, settled ? TILE_SETTLED : TILE_OPEN));
         imageStore(lists, at + ivec2(1, 0), uvec4(first_edge, fits ? edges : 0u, first_triangle, candidates.y));
         imageStore(lists, at + ivec2(2, 0), uvec4(whole, others, tile.y * tiles.x + tile.x, 0u));
         uint work = (fits ? edges : 0u) + whole + others + (params.counts.z - resume);
+        uint level = dark ? LEVEL_DARK : lit ? LEVEL_LIT : params.pattern.w;
         imageStore(estimates, estimate_place(part, ESTIMATE_WORK), uvec4(work));
-        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(dark ? LEVEL_DARK : params.pattern.w));
-        if (!dark && (params.pattern.y > 1u || whole + others > TASK_ENTRIES || partly)) {
+        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(level));
+        bool partly = resume < params.counts.z;
+        if (!settled) {
+            uint slot = atomicAdd(open_tiles.count, 1u);
+            atomicMax(open_tiles.groups_x, min(slot + 1u, TILE_ROW));
+            atomicMax(open_tiles.groups_y, slot / TILE_ROW + 1u);
+            imageStore(open_list, tile_entry_place(slot, tiles), uvec4(entry));
+        }
+        if (!settled && (params.pattern.y > 1u || whole + others > TASK_ENTRIES || partly)) {
             uint slot = atomicAdd(pieces.count, 1u);
             atomicMax(pieces.groups_x, min(slot + 1u, TILE_ROW));
             atomicMax(pieces.groups_y, slot / TILE_ROW + 1u);
             imageStore(pieces_list, tile_entry_place(slot, tiles), uvec4(entry));
         }
-        if (partly) {
+        if (!settled && partly) {
             uint slot = atomicAdd(partial.count, 1u);
             atomicMax(partial.groups_x, min(slot + 1u, TILE_ROW));
             atomicMax(partial.groups_y, slot / TILE_ROW + 1u);

@@ -57,7 +57,7 @@ const uint EDGE_CORNER_BITS = 2u;
 const uint EDGE_DOUBLE = 0x40000000u;
 const uint EDGE_TURNED = 0x80000000u;
 
-// Most that edges of one tile may count in sum: masks count in bytes, half of the edges up.
-const uint MOST_COUNT = 480u;
+// Most that edges of one tile may count in sum: an invocation that lists them has room for no more.
+const uint MOST_COUNT = 2048u;
 
 #endif

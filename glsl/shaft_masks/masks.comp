@@ -1,4 +1,5 @@
 #version 460
+#extension GL_EXT_control_flow_attributes : require
 // Masks of the listed tiles, of tasks on the rest of long lists, or of runs of nodes that lists do not
 // know: a workgroup each, and of each block of samples. Four pixels an invocation, so that each fetch of an
 // edge or a triangle serves four.
@@ -114,6 +115,44 @@ uint store(uint slot, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 bloc
     return 0u; // all of them are known later
 }
 
+vec3 fetch_edge_begin(uint code) {
+    uint triangle = (code & ~(EDGE_DOUBLE | EDGE_TURNED)) >> EDGE_CORNER_BITS;
+    return fetch_triangle_texel(4u * triangle + (code & ((1u << EDGE_CORNER_BITS) - 1u))).xyz;
+}
+
+vec3 fetch_edge_end(uint code) {
+    uint triangle = (code & ~(EDGE_DOUBLE | EDGE_TURNED)) >> EDGE_CORNER_BITS;
+    uint corner = code & ((1u << EDGE_CORNER_BITS) - 1u);
+    return fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
+}
+
+// Sets the bits of the samples that a triangle hides from four receivers.
+void add_blocker(MaskReceiver receivers[4], LightFrom lights[4], uint block, Blocker blocker, inout uvec2 blocked[4]) {
+    Hidden hidden[4];
+    [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+        hidden[i] = hidden_by(receivers[i], lights[i], blocker);
+    }
+    if (MASKED != 0u && material_is_masked(blocker.plane.w)) {
+        cut_holes(blocker, block, blocked, hidden);
+    }
+    [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+        blocked[i] |= hidden[i].within;
+    }
+}
+
+// What counted triangles hide where digits have no room for their number.
+uvec2 counted_again(Projection projection, uint first, uint edges) {
+    uint halves[HALVES * ROWS];
+    for (uint i = 0u; i < HALVES * ROWS; ++i) {
+        halves[i] = NO_HALVES;
+    }
+    for (uint i = 0u; i < edges; ++i) {
+        uint code = texelFetch(edge_pool, triangle_texel_place(first + i), 0).x;
+        count_edge_in_halves(projection, fetch_edge_begin(code), fetch_edge_end(code), code, halves);
+    }
+    return counted_mask_of_halves(halves);
+}
+
 void main() {
     uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
     if (index >= arguments.count) {
@@ -134,80 +173,81 @@ void main() {
     uint block = gl_WorkGroupID.z % params.pattern.y;
     fetch_light_rows(block);
 
-    uvec2 pixel = tile * TILE_SIZE + gl_LocalInvocationID.xy;
-    uvec2 step = uvec2(0u, 2u);
-    uvec2 blocked_0;
-    uvec2 blocked_1;
-    uvec2 blocked_2;
-    uvec2 blocked_3;
-    MaskReceiver receiver_0 = fetch_receiver(pixel, depths, blocked_0);
-    MaskReceiver receiver_1 = fetch_receiver(pixel + step, depths, blocked_1);
-    MaskReceiver receiver_2 = fetch_receiver(pixel + 2u * step, depths, blocked_2);
-    MaskReceiver receiver_3 = fetch_receiver(pixel + 3u * step, depths, blocked_3);
+    uvec2 pixels[4];
+    MaskReceiver receivers[4];
+    uvec2 blocked[4];
+    [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+        pixels[i] = tile * TILE_SIZE + gl_LocalInvocationID.xy + uvec2(0u, 2u * i);
+        receivers[i] = fetch_receiver(pixels[i], depths, blocked[i]);
+    }
     bool in_parts = params.pattern.y > 1u || entries.whole + entries.others > TASK_ENTRIES
         || stored.z < params.counts.z;
 
     if (WALK == 0u) {
-        Projection from_0 = projection_from(receiver_0, row_rise());
-        Projection from_1 = projection_from(receiver_1, row_rise());
-        Projection from_2 = projection_from(receiver_2, row_rise());
-        Projection from_3 = projection_from(receiver_3, row_rise());
-        uint counts_0[2u * ROWS];
-        uint counts_1[2u * ROWS];
-        uint counts_2[2u * ROWS];
-        uint counts_3[2u * ROWS];
-        for (uint i = 0u; i < 2u * ROWS; ++i) {
-            counts_0[i] = NO_COUNT;
-            counts_1[i] = NO_COUNT;
-            counts_2[i] = NO_COUNT;
-            counts_3[i] = NO_COUNT;
+        Projection from[4];
+        uint digits[4][ROWS];
+        int sums[4];
+        [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+            from[i] = projection_from(receivers[i], row_rise());
+            sums[i] = 0;
+            [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
+                digits[i][r] = NO_DIGITS;
+            }
         }
         uint edges = push.further != 0u ? 0u : entries.edges;
-        for (uint i = 0u; i < edges; ++i) {
-            uint code = texelFetch(edge_pool, triangle_texel_place(entries.first_edge + i), 0).x;
-            uint triangle = (code & ~(EDGE_DOUBLE | EDGE_TURNED)) >> EDGE_CORNER_BITS;
-            uint corner = code & ((1u << EDGE_CORNER_BITS) - 1u);
-            vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
-            vec3 b = fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
-            count_edge(from_0, a, b, code, counts_0);
-            count_edge(from_1, a, b, code, counts_1);
-            count_edge(from_2, a, b, code, counts_2);
-            count_edge(from_3, a, b, code, counts_3);
+        for (uint at_edge = 0u; at_edge < edges; ++at_edge) {
+            uint code = texelFetch(edge_pool, triangle_texel_place(entries.first_edge + at_edge), 0).x;
+            vec3 a = fetch_edge_begin(code);
+            vec3 b = fetch_edge_end(code);
+            [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+                count_edge(from[i], a, b, code, digits[i], sums[i]);
+            }
         }
-        blocked_0 |= counted_mask(counts_0);
-        blocked_1 |= counted_mask(counts_1);
-        blocked_2 |= counted_mask(counts_2);
-        blocked_3 |= counted_mask(counts_3);
+        bool spilled[4];
+        [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+            bool fits;
+            blocked[i] |= counted_mask(digits[i], sums[i], fits);
+            spilled[i] = !fits;
+        }
+        // Rare: one receiver after the other.
+        uint first_spilled = spilled[0] ? 0u : spilled[1] ? 1u : spilled[2] ? 2u : spilled[3] ? 3u : 4u;
+        for (uint at_spilled = first_spilled; at_spilled < 4u; ++at_spilled) {
+            vec3 position = receivers[0].position;
+            [[unroll]] for (uint i = 1u; i < 4u; ++i) {
+                position = i == at_spilled ? receivers[i].position : position;
+            }
+            Projection again = projection_from(MaskReceiver(position, 0u, true), row_rise());
+            uvec2 mask = counted_again(again, entries.first_edge, edges);
+            [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+                blocked[i] |= i == at_spilled && spilled[i] ? mask : uvec2(0u);
+            }
+        }
         uint first = push.further != 0u ? task.y : 0u;
         uint end = min(first + TASK_ENTRIES, entries.whole);
-        for (uint i = first; i < end; ++i) {
-            uint triangle = texelFetch(triangle_pool, triangle_texel_place(entries.first + i), 0).x;
+        for (uint at_whole = first; at_whole < end; ++at_whole) {
+            uint triangle = texelFetch(triangle_pool, triangle_texel_place(entries.first + at_whole), 0).x;
             vec3 a = fetch_triangle_texel(4u * triangle).xyz;
             vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
             vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
-            add_whole(from_0, a, b, c, blocked_0);
-            add_whole(from_1, a, b, c, blocked_1);
-            add_whole(from_2, a, b, c, blocked_2);
-            add_whole(from_3, a, b, c, blocked_3);
+            [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+                add_whole(from[i], a, b, c, blocked[i]);
+            }
         }
         end = min(first + TASK_ENTRIES, entries.whole + entries.others);
-        LightFrom light_0 = rows_from(view.light, receiver_0.position);
-        LightFrom light_1 = rows_from(view.light, receiver_1.position);
-        LightFrom light_2 = rows_from(view.light, receiver_2.position);
-        LightFrom light_3 = rows_from(view.light, receiver_3.position);
-        for (uint i = max(first, entries.whole); i < end; ++i) {
-            uint place = entries.first + entries.room - 1u - (i - entries.whole);
+        LightFrom lights[4];
+        [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+            lights[i] = rows_from(view.light, receivers[i].position);
+        }
+        for (uint at_other = max(first, entries.whole); at_other < end; ++at_other) {
+            uint place = entries.first + entries.room - 1u - (at_other - entries.whole);
             Blocker blocker = fetch_blocker(texelFetch(triangle_pool, triangle_texel_place(place), 0).x);
-            add_blocker(receiver_0, light_0, block, blocker, blocked_0);
-            add_blocker(receiver_1, light_1, block, blocker, blocked_1);
-            add_blocker(receiver_2, light_2, block, blocker, blocked_2);
-            add_blocker(receiver_3, light_3, block, blocker, blocked_3);
+            add_blocker(receivers, lights, block, blocker, blocked);
         }
     } else {
-        LightFrom light_0 = rows_from(view.light, receiver_0.position);
-        LightFrom light_1 = rows_from(view.light, receiver_1.position);
-        LightFrom light_2 = rows_from(view.light, receiver_2.position);
-        LightFrom light_3 = rows_from(view.light, receiver_3.position);
+        LightFrom lights[4];
+        [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+            lights[i] = rows_from(view.light, receivers[i].position);
+        }
         // A walk can begin at any node: what is known of those above is only that they may be met.
         uint first = (push.first_run + gl_WorkGroupID.z / params.pattern.y) * push.run;
         uint node = max(first, stored.z);
@@ -220,17 +260,14 @@ void main() {
             node = leaf || meets ? node + 1u : uint(-low.w);
             if (leaf && meets) {
                 Blocker blocker = fetch_blocker(uint(low.w));
-                add_blocker(receiver_0, light_0, block, blocker, blocked_0);
-                add_blocker(receiver_1, light_1, block, blocker, blocked_1);
-                add_blocker(receiver_2, light_2, block, blocker, blocked_2);
-                add_blocker(receiver_3, light_3, block, blocker, blocked_3);
+                add_blocker(receivers, lights, block, blocker, blocked);
             }
         }
     }
-    uint changes = store(entries.slot, block, pixel, receiver_0, blocked_0, in_parts)
-        + store(entries.slot, block, pixel + step, receiver_1, blocked_1, in_parts)
-        + store(entries.slot, block, pixel + 2u * step, receiver_2, blocked_2, in_parts)
-        + store(entries.slot, block, pixel + 3u * step, receiver_3, blocked_3, in_parts);
+    uint changes = 0u;
+    [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+        changes += store(entries.slot, block, pixels[i], receivers[i], blocked[i], in_parts);
+    }
     if (changes > 0u) {
         imageAtomicAdd(estimates, estimate_place(part, ESTIMATE_CHANGES), changes);
     }

@@ -69,26 +69,36 @@ struct MaskReceiver {
 
 // The rows of a block of samples: params.rows, columns from the block's first one on.
 vec4 light_rows[ROWS];
+// Four times y and z, z plus 1.5.
+vec2 light_quads[ROWS];
 
 void fetch_light_rows(uint block) {
     uint across = params.pattern.x;
-    for (uint r = 0u; r < ROWS; ++r) {
+    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
         light_rows[r] = params.rows[block / across * ROWS + r];
         light_rows[r].z -= float(block % across * COLUMNS);
+        light_quads[r] = 4.0 * light_rows[r].yz + vec2(0.0, 1.5);
     }
 }
 
 // Adding 1.5 * 2^23 leaves a float's integer part in its lowest bits.
 const float TO_INTEGER = 12582912.0;
 
-// Number of a row's samples that lie before the place, 0 to 8.
-uint columns_before(vec4 row, float place) {
-    float column = row.y * place + row.z;
+// Four times the number of a row's samples that lie before the place, 0 to 32: rounded from above 4 n - 2, so that
+// the sample at a whole column plus 0.5 is the next one's neighbour.
+uint quads_before(uint r, float place) {
+    vec2 row = light_quads[r];
+    float quad = row.x * place + row.y;
     if (LIGHT_SHAPE == LIGHT_SUN) {
-        column = row.y * (place * inversesqrt(row.w + place * place * SUN_TANGENT_SQUARE)) + row.z;
+        quad = row.x * (place * inversesqrt(light_rows[r].w + place * place * SUN_TANGENT_SQUARE)) + row.y;
     }
-    precise float shifted = clamp(column, 0.0, float(COLUMNS)) + TO_INTEGER;
-    return floatBitsToUint(shifted) & 15u;
+    precise float shifted = clamp(quad, 0.0, 33.5) + TO_INTEGER;
+    return floatBitsToUint(shifted) & 60u;
+}
+
+// Number of a row's samples that lie before the place, 0 to 8.
+uint columns_before(uint r, float place) {
+    return quads_before(r, place) >> 2;
 }
 
 // What projects points onto the plane of the samples, as coordinates on the light.
@@ -136,50 +146,99 @@ Side side_between(vec2 a, vec2 b) {
     return Side(a.y < b.y ? a : b, max(a.y, b.y), slope);
 }
 
-// Number of a row's samples before the edge; of no meaning in rows that it does not cross.
-uint columns_before_side(vec4 row, Side side) {
-    precise float place = (row.x - side.low.y) * side.slope + side.low.x;
-    return columns_before(row, place);
+// Four times the number of a row's samples before the edge; of no meaning in rows that it does not cross.
+uint quads_before_side(uint r, Side side) {
+    precise float place = (light_rows[r].x - side.low.y) * side.slope + side.low.x;
+    return quads_before(r, place);
+}
+
+uint columns_before_side(uint r, Side side) {
+    return quads_before_side(r, side) >> 2;
 }
 
 bool crosses(vec4 row, Side side) {
     return side.low.y <= row.x && row.x < side.high;
 }
 
-// Numbers of triangles before samples: of each row two words of four bytes.
-const uint NO_COUNT = 0x08080808u; // below nothing there is some room for rounding
-const uint ONE_EACH = 0x01010101u;
+// Numbers of triangles before samples: a word of eight digits for each row. Below nothing there is some room for
+// rounding, and above it for 13 triangles. Sums of edges may leave that range on their way; where their end does,
+// digits spill into each other. Then their sum is not that of the numbers, which is kept beside them.
+const uint NO_DIGITS = 0x22222222u;
+const uint ONE_DIGIT = 0x11111111u;
 
-// Counts on from an edge: a triangle begins or ends there.
-void count_edge(Projection projection, vec3 from, vec3 to, uint code, inout uint counts[2u * ROWS]) {
+struct Edge {
+    Side side;
+    bool ends; // triangles end there, and do not begin
+};
+
+Edge project_edge(Projection projection, vec3 from, vec3 to, uint code) {
     vec2 a = project(projection, from);
     vec2 b = project(projection, to);
-    Side side = side_between(a, b);
     // Corners of a triangle that is seen from its front go round counter-clockwise, and its inside is on
     // the left of edges that go up.
     bool ends = (a.y < b.y) == (((code & EDGE_TURNED) != 0u) == projection.turned);
-    uint step = (code & EDGE_DOUBLE) != 0u ? 2u * ONE_EACH : ONE_EACH;
-    step = ends ? 0u - step : step;
+    return Edge(side_between(a, b), ends);
+}
+
+// Counts on from an edge. sum: a quarter of it for all samples, in all rows, beside the digits.
+void count_edge(Projection projection, vec3 from, vec3 to, uint code, inout uint digits[ROWS], inout int sum) {
+    Edge edge = project_edge(projection, from, to, code);
+    int weight = (code & EDGE_DOUBLE) != 0u ? 2 : 1;
+    weight = edge.ends ? -weight : weight;
+    uint step = ONE_DIGIT * uint(weight);
+    uint quads = 0u;
+    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
+        uint before = crosses(light_rows[r], edge.side) ? quads_before_side(r, edge.side) : 32u;
+        digits[r] += before < 32u ? step << before : 0u;
+        quads += before;
+    }
+    sum += weight * int(32u * ROWS - quads);
+}
+
+// The samples with another number than none; 0 with fits false where digits spilled.
+uvec2 counted_mask(uint digits[ROWS], int sum, out bool fits) {
+    uvec2 blocked = uvec2(0u);
+    uint total = 0u;
+    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
+        uint pairs = (digits[r] & 0x0f0f0f0fu) + (digits[r] >> 4 & 0x0f0f0f0fu);
+        total += pairs * 0x01010101u >> 24;
+        uint off = digits[r] ^ NO_DIGITS;
+        off |= off >> 2;
+        off = (off | off >> 1) & ONE_DIGIT;
+        off = (off | off >> 3) & 0x03030303u;
+        off = (off | off >> 6) & 0x000f000fu;
+        blocked[r / 4u] |= ((off | off >> 12) & 0xffu) << (8u * (r % 4u));
+    }
+    fits = 4 * (int(total) - int(2u * COLUMNS * ROWS)) == sum;
+    return fits ? blocked : uvec2(0u);
+}
+
+// The same with half a word for each sample, four words a row: for as many triangles as a list may hold.
+const uint NO_HALVES = 0x00080008u;
+const uint ONE_HALF = 0x00010001u;
+const uint HALVES = COLUMNS / 2u;
+
+void count_edge_in_halves(Projection projection, vec3 from, vec3 to, uint code, inout uint halves[HALVES * ROWS]) {
+    Edge edge = project_edge(projection, from, to, code);
+    uint step = (code & EDGE_DOUBLE) != 0u ? 2u * ONE_HALF : ONE_HALF;
+    step = edge.ends ? 0u - step : step;
     for (uint r = 0u; r < ROWS; ++r) {
-        uint bits = 8u * columns_before_side(light_rows[r], side);
-        uint crossed = crosses(light_rows[r], side) ? step : 0u;
-        counts[2u * r] += bits < 32u ? crossed << bits : 0u;
-        counts[2u * r + 1u] += bits < 32u ? crossed : bits < 64u ? crossed << (bits & 31u) : 0u;
+        uint before = columns_before_side(r, edge.side);
+        uint crossed = crosses(light_rows[r], edge.side) ? step : 0u;
+        for (uint i = 0u; i < HALVES; ++i) {
+            halves[HALVES * r + i] += before <= 2u * i ? crossed : before == 2u * i + 1u ? crossed << 16 : 0u;
+        }
     }
 }
 
-// A bit for each byte that is not NO_COUNT's.
-uint counted_bits(uint counts) {
-    uint off = counts ^ NO_COUNT;
-    uint high = ((off & 0x7f7f7f7fu) + 0x7f7f7f7fu | off) & 0x80808080u;
-    return (high >> 7) * 0x01020408u >> 24 & 15u;
-}
-
-uvec2 counted_mask(uint counts[2u * ROWS]) {
+uvec2 counted_mask_of_halves(uint halves[HALVES * ROWS]) {
     uvec2 blocked = uvec2(0u);
     for (uint r = 0u; r < ROWS; ++r) {
-        uint row = counted_bits(counts[2u * r]) | counted_bits(counts[2u * r + 1u]) << 4;
-        blocked[r / 4u] |= row << (8u * (r % 4u));
+        for (uint i = 0u; i < HALVES; ++i) {
+            uint off = halves[HALVES * r + i] ^ NO_HALVES;
+            uint pair = ((off & 0xffffu) != 0u ? 1u : 0u) | (off >> 16 != 0u ? 2u : 0u);
+            blocked[r / 4u] |= pair << (8u * (r % 4u) + 2u * i);
+        }
     }
     return blocked;
 }
@@ -199,11 +258,11 @@ void add_whole(Projection projection, vec3 corner_a, vec3 corner_b, vec3 corner_
     Side whole = side_between(first, last);
     Side lower = side_between(first, middle);
     Side upper = side_between(middle, last);
-    for (uint r = 0u; r < ROWS; ++r) {
+    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
         vec4 row = light_rows[r];
         bool below = row.x < middle.y;
         Side other = Side(below ? lower.low : upper.low, 0.0, below ? lower.slope : upper.slope);
-        uint within = 0xffu << columns_before_side(row, whole) ^ 0xffu << columns_before_side(row, other);
+        uint within = 0xffu << columns_before_side(r, whole) ^ 0xffu << columns_before_side(r, other);
         blocked[r / 4u] |= crosses(row, whole) ? (within & 0xffu) << (8u * (r % 4u)) : 0u;
     }
 }
@@ -232,9 +291,9 @@ uvec2 mask_of_line(vec3 line) {
     float at = line.z * inverse;
     uint flip = across < 0.0 ? 0xffu : 0u;
     uvec2 within = uvec2(0u);
-    for (uint r = 0u; r < ROWS; ++r) {
+    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
         precise float place = slope * light_rows[r].x + at;
-        uint row = (0xffu << columns_before(light_rows[r], place) ^ flip) & 0xffu;
+        uint row = (0xffu << columns_before(r, place) ^ flip) & 0xffu;
         within[r / 4u] |= row << (8u * (r % 4u));
     }
     return within;
@@ -261,35 +320,14 @@ Blocker fetch_blocker(uint triangle) {
         fetch_triangle_texel(4u * triangle + 3u));
 }
 
-// Takes out the samples that are seen through holes. ab, bc, ca: the lines of the triangle's edges.
-void cut_holes(Blocker blocker, uint block, vec3 ab, vec3 bc, vec3 ca, uvec2 blocked, inout uvec2 within) {
-    uint material = material_number(blocker.plane.w);
-    // What others block already needs no look.
-    uvec2 rest = within & ~blocked;
-    while ((rest.x | rest.y) != 0u) {
-        uint word = rest.x != 0u ? 0u : 1u;
-        uint bit = uint(findLSB(rest[word]));
-        rest[word] &= rest[word] - 1u;
-        uint across = params.pattern.x;
-        vec4 row = params.rows[block / across * ROWS + 4u * word + bit / 8u];
-        float column = float(block % across * COLUMNS + bit % 8u);
-        float place = (column + 0.5 - row.z) / max(row.y, 1.0e-37);
-        if (LIGHT_SHAPE == LIGHT_SUN) {
-            float scaled = place * place * SUN_TANGENT_SQUARE;
-            place *= sqrt(row.w / max(1.0 - scaled, 1.0e-6));
-        }
-        vec3 at = vec3(place, row.x, 1.0);
-        vec3 weights = vec3(dot(bc, at), dot(ca, at), dot(ab, at));
-        float sum = weights.x + weights.y + weights.z;
-        weights = sum != 0.0 ? weights / sum : vec3(1.0, 0.0, 0.0);
-        if (is_hole(material, fetch_uv(blocker.triangle, weights))) {
-            within[word] &= ~(1u << bit);
-        }
-    }
-}
+// The samples that a triangle hides from a receiver, wherever it is, without regard to holes; and the lines on the light
+// that its corners' weights, not scaled, vary along.
+struct Hidden {
+    uvec2 within;
+    mat3 weights;
+};
 
-// Sets the bits of the samples that the triangle hides from the receiver, wherever it is.
-void add_blocker(MaskReceiver receiver, LightFrom light, uint block, Blocker blocker, inout uvec2 blocked) {
+Hidden hidden_by(MaskReceiver receiver, LightFrom light, Blocker blocker) {
     vec3 a = blocker.a - receiver.position;
     vec3 b = blocker.b - receiver.position;
     vec3 c = blocker.c - receiver.position;
@@ -307,11 +345,52 @@ void add_blocker(MaskReceiver receiver, LightFrom light, uint block, Blocker blo
     bool meets = most >= 0.0 && abs(height) > rounding_m && receiver.id != blocker.triangle + 1u;
     uvec2 within = mask_of_line(ab) & mask_of_line(bc) & mask_of_line(ca);
     within &= line_least(beyond) < 0.0 ? mask_of_line(beyond) : uvec2(0xffffffffu);
-    within = meets ? within : uvec2(0u);
-    if (MASKED != 0u && material_is_masked(blocker.plane.w)) {
-        cut_holes(blocker, block, ab, bc, ca, blocked, within);
+    return Hidden(meets ? within : uvec2(0u), mat3(bc, ca, ab));
+}
+
+// Takes out the samples that are seen through holes, of four receivers: each invocation looks at one sample after the
+// other, whosoever it is, because a vector of them waits for the one that has the most. already: what others hide.
+void cut_holes(Blocker blocker, uint block, uvec2 already[4], inout Hidden hidden[4]) {
+    uint material = material_number(blocker.plane.w);
+    vec4 texture_place = fetch_texture(material);
+    float cutoff = fetch_finish(material).z;
+    float alpha = fetch_base_color(material).a;
+    // Along the columns the coordinates of the corners, and ones.
+    vec4 ab = fetch_uv_texel(triangle_texel_place(2u * blocker.triangle));
+    vec2 c = fetch_uv_texel(triangle_texel_place(2u * blocker.triangle + 1u)).xy;
+    vec3 us = vec3(ab.x, ab.z, c.x);
+    vec3 vs = vec3(ab.y, ab.w, c.y);
+    mat3 places[4];
+    uvec2 rest[4];
+    [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+        places[i] = mat3(hidden[i].weights * us, hidden[i].weights * vs, hidden[i].weights * vec3(1.0));
+        rest[i] = hidden[i].within & ~already[i];
     }
-    blocked |= within;
+    uint across = params.pattern.x;
+    while (((rest[0].x | rest[0].y | rest[1].x | rest[1].y) | (rest[2].x | rest[2].y | rest[3].x | rest[3].y)) != 0u) {
+        uint at = (rest[0].x | rest[0].y) != 0u ? 0u : (rest[1].x | rest[1].y) != 0u ? 1u
+            : (rest[2].x | rest[2].y) != 0u ? 2u : 3u;
+        uvec2 own = at == 0u ? rest[0] : at == 1u ? rest[1] : at == 2u ? rest[2] : rest[3];
+        mat3 place = at == 0u ? places[0] : at == 1u ? places[1] : at == 2u ? places[2] : places[3];
+        uint word = own.x != 0u ? 0u : 1u;
+        uint bits = own.x != 0u ? own.x : own.y;
+        uint bit = uint(findLSB(bits));
+        uvec2 taken = own.x != 0u ? uvec2(1u << bit, 0u) : uvec2(0u, 1u << bit);
+        vec4 row = params.rows[block / across * ROWS + 4u * word + bit / 8u];
+        float column = float(block % across * COLUMNS + bit % 8u);
+        float x = (column + 0.5 - row.z) / max(row.y, 1.0e-37);
+        if (LIGHT_SHAPE == LIGHT_SUN) {
+            x *= sqrt(row.w / max(1.0 - x * x * SUN_TANGENT_SQUARE, 1.0e-6));
+        }
+        vec3 uvw = vec3(x, row.x, 1.0) * place;
+        vec2 uv = uvw.z != 0.0 ? uvw.xy / uvw.z : ab.xy;
+        bool hole = alpha * texture_color(texture_place, uv).a < cutoff;
+        [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+            uvec2 mine = i == at ? taken : uvec2(0u);
+            rest[i] &= ~mine;
+            hidden[i].within &= hole ? ~mine : uvec2(0xffffffffu);
+        }
+    }
 }
 
 // What the receiver's own plane hides of the light.

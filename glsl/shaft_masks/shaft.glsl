@@ -46,6 +46,13 @@ bool is_in_part(vec2 depths, float depth) {
     return depth >= depths.x && depth < depths.y;
 }
 
+// One of the surfaces.
+vec3 fetch_some_surface(uvec2 part) {
+    ivec2 place = ivec2(part.x * SHAFT_TEXELS + SHAFT_PLANES, part.y);
+    return vec3(fetch_shaft_texel(place + ivec2(5, 0)).w, fetch_shaft_texel(place + ivec2(8, 0)).w,
+        fetch_shaft_texel(place + ivec2(9, 0)).w);
+}
+
 Shaft fetch_shaft(uvec2 part) {
     ivec2 place = ivec2(part.x * SHAFT_TEXELS, part.y);
     Shaft shaft;

@@ -28,6 +28,7 @@ layout(set = 0, binding = 8, std430) buffer PartArguments {
     TileArguments parts;
 };
 layout(set = 0, binding = 9, r32ui) uniform writeonly uimage2D part_list;
+layout(set = 0, binding = 10) uniform sampler2D tile_bounds;
 
 vec4 fetch_triangle_texel(uint texel) {
     return texelFetch(triangles, triangle_texel_place(texel), 0);
@@ -116,7 +117,7 @@ void store_surfaces(ivec2 place, Light light, vec3 some, mat3 frame, vec3 low, v
     imageStore(shafts, place, vec4(center, slack));
     imageStore(shafts, place + ivec2(1, 0), vec4(frame[0] * half_size.x, depths.x));
     imageStore(shafts, place + ivec2(2, 0), vec4(frame[1] * half_size.y, depths.y));
-    imageStore(shafts, place + ivec2(3, 0), vec4(frame[2] * half_size.z, 0.0));
+    imageStore(shafts, place + ivec2(3, 0), vec4(frame[2] * half_size.z, some.x));
     imageStore(shafts, place + ivec2(4, 0), vec4(z, tilt));
     imageStore(shafts, place + ivec2(5, 0), vec4(least, most, radius, end));
 }
@@ -132,21 +133,20 @@ void main() {
     Light light = view.light;
     vec3 eye = view.camera.eye.xyz;
 
-    // The gap in the middle of the tile's depths.
-    float nearest = FAR;
-    float farthest = 0.0;
-    for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
-        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
-        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
-        nearest = depth > 0.0 ? min(nearest, depth) : nearest;
-        farthest = max(farthest, depth);
-    }
+    // The gap in the middle of the tile's depths, if there is room for one.
+    ivec2 bounds_place = ivec2(tile.x * TILE_TEXELS, tile.y);
+    vec3 depth_bounds = texelFetch(tile_bounds, bounds_place, 0).xyz;
+    TileBounds bounds = tile_bounds_of(vec4(depth_bounds, 0.0), vec4(0.0), vec4(0.0));
+    float nearest = bounds.nearest;
+    float farthest = bounds.farthest;
+    float width = nearest * float(TILE_SIZE) * length(view.camera.pixel_right.xyz);
+    uint looks = farthest - nearest > width || !bounds.all_hit ? TILE_SIZE * TILE_SIZE : 0u;
     float middle = 0.5 * nearest + 0.5 * farthest;
     float before_gap = 0.0;
     float after_gap = FAR;
     uvec2 at_near = tile * TILE_SIZE;
     uvec2 at_far = tile * TILE_SIZE;
-    for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
+    for (uint i = 0u; i < looks; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
         float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
         at_near = depth < middle && depth > before_gap ? pixel : at_near;
@@ -154,7 +154,6 @@ void main() {
         after_gap = depth >= middle ? min(after_gap, depth) : after_gap;
         at_far = depth == farthest ? pixel : at_far;
     }
-    float width = nearest * float(TILE_SIZE) * length(view.camera.pixel_right.xyz);
     float gap = after_gap - before_gap;
     bool split = MOST_PARTS > 1u && before_gap > 0.0 && gap > width && gap > LEAST_GAP * (farthest - nearest);
     bool behind = gl_GlobalInvocationID.y > 0u;
@@ -165,8 +164,7 @@ void main() {
 
     // A surface, for the frames.
     uvec2 at = split && !behind ? at_near : at_far;
-    float deepest = split && !behind ? before_gap : farthest;
-    vec3 some = eye + deepest * pixel_ray(view.camera, at);
+    vec3 some = eye + texelFetch(view_depth, ivec2(at), 0).x * pixel_ray(view.camera, at);
     mat3 frame = light_frame(light, some);
     mat3 box_frame = surface_frame(at, pixel_ray(view.camera, at));
 
@@ -270,8 +268,8 @@ void main() {
     ivec2 place = ivec2(part.x * SHAFT_TEXELS, part.y);
     store_surfaces(place + ivec2(SHAFT_PLANES + 2u, 0), light, some, box_frame, own_low - slack,
         own_high + slack, slack, depths);
-    imageStore(shafts, place + ivec2(SHAFT_PLANES + 8u, 0), vec4(normal_low, 0.0));
-    imageStore(shafts, place + ivec2(SHAFT_PLANES + 9u, 0), vec4(normal_high, 0.0));
+    imageStore(shafts, place + ivec2(SHAFT_PLANES + 8u, 0), vec4(normal_low, some.y));
+    imageStore(shafts, place + ivec2(SHAFT_PLANES + 9u, 0), vec4(normal_high, some.z));
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         imageStore(shafts, place + ivec2(i, 0), planes[i]);
     }

@@ -61,7 +61,8 @@ pub struct CapturedLight {
     pub visibility: Vec<f32>,
     /// Passes that made it.
     pub passes: Vec<String>,
-    /// What the technique counts of its work, by name; of [`FrameRenderer::render_counted`](super::FrameRenderer::render_counted).
+    /// What the technique counts of its work, by name; of [`FrameRenderer::render_counted`](super::FrameRenderer::render_counted),
+    /// and of frames of a technique [with a limit](Technique::has_limit).
     pub counters: BTreeMap<String, u64>,
     /// The technique, and why.
     pub choice: Choice,

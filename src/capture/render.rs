@@ -381,7 +381,10 @@ impl ReadBacks {
         sources.extend(frame.visibility.iter().map(|image| picture(*image, 4)));
         let mut tallies = Vec::new();
         for mask in &frame.masks {
-            let tally = mask.tally.filter(|_| is_counted);
+            // A limit that was asked for is told by the counters too.
+            let tally = mask
+                .tally
+                .filter(|_| is_counted || request.technique.has_limit());
             let desc = tally.and_then(|tally| graph.image_desc(tally.image));
             tallies.push(tally.zip(desc).map(|(tally, desc)| {
                 sources.push(Source {

@@ -211,6 +211,7 @@ impl<'a> Runner<'a> {
         if sequence.picture != Kind::None && !sequence.allow_uniform {
             shot.refuse_single_value()?;
         }
+        shot.refuse_missed_bound()?;
         let mut files = Vec::new();
         for (path, content) in names(sequence, id, &request) {
             let file = ImageFile::by_ending(path.clone().into()).map_err(CliError::Usage)?;

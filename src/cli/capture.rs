@@ -127,7 +127,7 @@ struct RefinementArgs {
     #[arg(long, value_name = "E", allow_hyphen_values = true)]
     target_error: Option<String>,
 
-    /// Proven bound on the error of every pixel
+    /// Proven bound on the error of every pixel; where one stays above it the command fails
     #[arg(long, value_name = "E", allow_hyphen_values = true)]
     bound: Option<String>,
 
@@ -435,6 +435,7 @@ impl Job<'_> {
         if args.output.is_some() && !args.allow_uniform {
             shot.refuse_single_value()?;
         }
+        shot.refuse_missed_bound()?;
         Ok(shot)
     }
 

@@ -52,6 +52,16 @@ pub(super) enum CliError {
         "every pixel of the picture is {value:?}; check camera and lights, or pass --allow-uniform"
     )]
     Uniform { value: [f32; 3] },
+    /// The technique's samples do not go as far as the bound asked for.
+    #[error(
+        "light `{light}`: a pixel's error is proven to be at most {reached}, not {asked} as asked for with bound; \
+         --visibility-bound without --bound shows where"
+    )]
+    Bound {
+        light: String,
+        asked: f32,
+        reached: f32,
+    },
 }
 
 impl From<CaptureError> for CliError {

@@ -166,6 +166,21 @@ impl Shot {
         }
     }
 
+    /// A bound that was asked for and not reached is a failure: the files would not be what they say.
+    pub(super) fn refuse_missed_bound(&self) -> Result<(), CliError> {
+        for (captured, light) in self.captured.lights.iter().zip(&self.lights) {
+            if let Some([asked, reached]) = self.technique.missed_bound(&captured.counters) {
+                let light = light.name.clone();
+                return Err(CliError::Bound {
+                    light,
+                    asked,
+                    reached,
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// The report's entries: one a light.
     pub(super) fn entries<'s>(
         &'s self,

@@ -429,6 +429,21 @@ impl Technique {
         }
     }
 
+    /// Whether its options ask for a bound on the error that it may fail to reach.
+    pub fn has_limit(self) -> bool {
+        matches!(self, Self::ShaftMasks(options) if options.bound.is_some())
+    }
+
+    /// Of a technique [with a limit](Self::has_limit) what a light's counters
+    /// ([`CapturedLight::counters`](crate::capture::CapturedLight::counters)) say about a bound that was not
+    /// reached: the one asked for and the largest one of any pixel, 0 to 1.
+    pub fn missed_bound(self, counters: &BTreeMap<String, u64>) -> Option<[f32; 2]> {
+        let Self::ShaftMasks(options) = self else {
+            return None;
+        };
+        shaft_masks::missed_bound(&options, counters)
+    }
+
     /// Declares the passes that make one light's visibility.
     pub fn add_passes<'f>(self, graph: &mut Graph<'f>, inputs: &ShadowInputs<'f>) -> ShadowMask {
         if let Some(shape) = self.unblocked_shape(&inputs.light)

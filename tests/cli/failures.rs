@@ -324,3 +324,30 @@ fn a_closed_or_full_standard_output_is_no_panic() -> Result {
     }
     Ok(())
 }
+
+#[test]
+fn a_bound_that_is_not_reached_is_a_failure() -> Result {
+    let folder = tempfile::tempdir()?;
+    let at = |name: &str| folder.path().join(name);
+    let with_bound = |bound: &str| {
+        let mut command = capture_command(SPHERE, "64x48");
+        command
+            .args(["--technique", "shaft-masks", "--bound", bound])
+            .arg("--visibility")
+            .arg(at("visibility.exr"))
+            .arg("--visibility-bound")
+            .arg(at("bound.exr"));
+        command
+    };
+    // Any edge before the light crosses some of 1024 cells.
+    let output = with_bound("0.001").output()?;
+    assert_fails(&output, 1, &["`lamp`", "0.001", "bound"]);
+    assert_eq!(names(folder.path())?, [""; 0]);
+
+    capture(&mut with_bound("0.9"))?;
+    assert_eq!(names(folder.path())?, ["bound.exr", "visibility.exr"]);
+    let (_, _, bounds) = exr::read_channel(at("bound.exr"), "Y")?;
+    let most = bounds.into_iter().fold(0.0, f32::max);
+    assert!(most > 0.0 && most <= 0.9, "{most}");
+    Ok(())
+}

@@ -33,6 +33,7 @@ mod views;
 pub use options::{Buckets, Footprint, MdiOptions};
 
 use super::receivers::add_receivers;
+use super::shaft_masks::add_classes;
 use super::{ShadowInputs, ShadowMask, Tally, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, Graph, PassKind, Stage};
@@ -64,17 +65,21 @@ pub(super) fn add_passes<'f>(
     let casters = (boxes.as_slice(), blocks.as_slice());
     let views = views::mdi_views(light, &inputs.receivers, casters, (&options, size));
     let layers = layers::add_layers(graph, inputs, &options, (&views, &runs));
-    add_visibility(graph, inputs, &layers)
+    add_visibility(graph, inputs, &layers, options.classes)
 }
 
 fn add_visibility<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
     layers: &Layers,
+    classes: bool,
 ) -> ShadowMask {
     let name = &inputs.light_name;
     let light = inputs.light;
-    let receivers = add_receivers(graph, inputs, NAME, light.shape.reach());
+    let mut receivers = add_receivers(graph, inputs, NAME, light.shape.reach());
+    if classes {
+        receivers = add_classes(graph, inputs, NAME, &receivers);
+    }
     let list = receivers.list;
     let gbuffer = inputs.gbuffer;
     let layers = *layers;

@@ -52,6 +52,9 @@ pub struct MdiOptions {
     /// What no ray of a pixel is blocked at is found for all of them at once, before any is traced:
     /// the picture is the same without.
     pub early: bool,
+    /// Tiles of the picture that see all of the light or nothing of it are told from the triangles
+    /// between them and the light, and no ray of theirs is traced.
+    pub classes: bool,
 }
 
 fn switch(value: &str) -> Option<bool> {
@@ -79,6 +82,7 @@ impl MdiOptions {
         depths: 4,
         sides: false,
         early: true,
+        classes: false,
     };
 
     /// What can be set.
@@ -139,6 +143,12 @@ impl MdiOptions {
             "on or off",
             "whether boundaries that block no ray of a pixel are ruled out before any is traced",
         ),
+        TechniqueOption::new(
+            "classes",
+            "off",
+            "off or on (by the triangles between a tile and the light, as `shaft-masks` does)",
+            "whether tiles that see all of the light or nothing of it are left out of tracing",
+        ),
     ];
 
     /// The values, in the order of [`ALL`](Self::ALL).
@@ -164,6 +174,7 @@ impl MdiOptions {
             self.depths.to_string(),
             if self.sides { "on" } else { "off" }.to_string(),
             if self.early { "on" } else { "off" }.to_string(),
+            if self.classes { "on" } else { "off" }.to_string(),
         ]
     }
 
@@ -217,6 +228,7 @@ impl MdiOptions {
             "depths" => self.depths = number(1..=64)?,
             "sides" => self.sides = switch(value)?,
             "early" => self.early = switch(value)?,
+            "classes" => self.classes = switch(value)?,
             _ => return None,
         }
         Some(())

@@ -27,6 +27,8 @@ struct Candidates {
     further: BufferId,
     partial: TileList,
     pieces: TileList,
+    /// Tiles that masks are made of.
+    open: TileList,
 }
 
 impl Making {
@@ -55,6 +57,7 @@ impl Making {
         let [across, down] = tile_counts(size);
         let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
         let mut penumbra = part_list(graph, inputs, "penumbra");
+        let mut open = part_list(graph, inputs, "open");
         let mut partial = part_list(graph, inputs, "partial");
         let mut pieces = part_list(graph, inputs, "pieces");
         let sixteen = BufferDesc { size: 16 };
@@ -62,6 +65,7 @@ impl Making {
         let further = graph.create_buffer(format!("{NAME}.further {name}"), sixteen);
         let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
         penumbra.clear(&mut pass);
+        open.clear(&mut pass);
         partial.clear(&mut pass);
         pieces.clear(&mut pass);
         let used = pass.overwrite(used, Access::Clear);
@@ -71,7 +75,8 @@ impl Making {
         let none = [0u32, 1, sizes.blocks, 0];
         let no_partial = [0u32, 1, runs * sizes.blocks, 0];
         let arguments = [
-            (penumbra.arguments, none),
+            (penumbra.arguments, [0, 1, 1, 0]),
+            (open.arguments, none),
             (further, none),
             (partial.arguments, no_partial),
             (pieces.arguments, [0, 1, 1, 0]),
@@ -141,6 +146,7 @@ impl Making {
             further,
             partial,
             pieces,
+            open,
         };
         let made = Made {
             visibility,
@@ -166,6 +172,7 @@ impl Making {
             further,
             mut partial,
             mut pieces,
+            mut open,
         } = candidates;
         let edges = texels(vk::Format::R32_UINT, sizes.edge_rows * POOL_WIDTH);
         let edges = graph.create_image(format!("{NAME}.edges {name}"), edges);
@@ -174,27 +181,21 @@ impl Making {
         let tasks = sizes.pool_rows * POOL_WIDTH / sizes.task_entries;
         let tasks = texels(vk::Format::R32G32B32A32_UINT, tasks);
         let tasks = graph.create_image(format!("{NAME}.tasks {name}"), tasks);
-        let (ids, tile_bounds) = (inputs.ids, inputs.tile_bounds);
+        let ids = inputs.ids;
         let view_depth = inputs.gbuffer.view_depth;
         let (view_params, part) = inputs.view_params;
         let shape = shape_number(&inputs.light.shape);
         let mut pass = graph.pass(format!("{NAME}.entries {name}"), PassKind::Compute);
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
-        let images = [
-            tile_bounds,
-            ids.triangles,
-            ids.neighbours,
-            shafts,
-            view_depth,
-            pool,
-        ];
+        let images = [ids.triangles, ids.neighbours, shafts, view_depth, pool];
         for image in images {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         tiles.read(&mut pass);
         partial.fill(&mut pass);
         pieces.fill(&mut pass);
+        open.fill(&mut pass);
         let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
         let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
         let further = pass.write(further, Access::StorageReadWrite(Stage::Compute));
@@ -208,7 +209,7 @@ impl Making {
             let bindings = [
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
-                Bind::sampled(2, tile_bounds, nearest),
+                Bind::storage_image(2, open.tiles),
                 Bind::sampled(3, ids.triangles, nearest),
                 Bind::sampled(4, ids.neighbours, nearest),
                 Bind::uniform(5, tiles.arguments),
@@ -228,6 +229,7 @@ impl Making {
                 Bind::storage_buffer(19, pieces.arguments),
                 Bind::storage_image(20, pieces.tiles),
                 Bind::storage_image(21, estimates),
+                Bind::storage_buffer(22, open.arguments),
             ];
             let pipeline = ComputePipelineDesc {
                 constants: vec![(0, shape), (4, sizes.task_entries)],
@@ -237,7 +239,7 @@ impl Making {
             tiles.dispatch(ctx)
         });
         let lists = Lists {
-            tiles,
+            tiles: open,
             lists,
             edges,
             triangles,

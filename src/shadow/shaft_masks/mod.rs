@@ -17,7 +17,7 @@
 //! | `start`, `tiles` | the picture's tiles that some of the light is above |
 //! | `shafts` | the tiles, in two parts where they span a gap in depth; their shafts, and boxes around their surfaces |
 //! | `lists` | lit tiles settled; candidates of the others |
-//! | `entries` | dark tiles settled; edges and triangles of the others |
+//! | `entries` | more lit tiles and dark ones settled; edges and triangles of the others |
 //! | `masks` | visibility of the others, or what the beginnings of long lists hide |
 //! | `further` | what the rest of long lists hides |
 //! | `walk` | what triangles hide that lists had no room for |
@@ -35,6 +35,7 @@ mod refine;
 mod samples;
 
 pub use options::ShaftOptions;
+pub(super) use refine::missed_bound;
 pub use samples::light_samples;
 
 use super::receivers::{Receivers, add_receivers};
@@ -194,6 +195,32 @@ pub(super) fn add_passes<'f>(
     }
 }
 
+/// Declares the passes that settle, for another technique, the tiles that see all of the light or
+/// nothing of it, from the pixels' centres; the others stay on the list.
+pub(super) fn add_classes(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    technique: &str,
+    receivers: &Receivers,
+) -> Receivers {
+    let [across, down] = tile_counts(inputs.camera.size());
+    let options = ShaftOptions::DEFAULT;
+    let sizes = Sizes::new(across * down, &options, inputs.scene.has_masks());
+    let params = add_params(graph, inputs, &sizes, options.side, "params");
+    let (shafts, parts) = add_shafts(graph, inputs, (technique, 1), params, receivers);
+    let making = lists::Making {
+        params,
+        shafts,
+        sizes,
+        estimates: refine::no_estimates(graph, inputs),
+    };
+    let (lists, made) = making.add(graph, inputs, parts, receivers.visibility);
+    Receivers {
+        list: lists.tiles,
+        visibility: made.visibility,
+    }
+}
+
 /// Declares the uniform buffer of masks of `side` rows of samples.
 fn add_params(
     graph: &mut Graph<'_>,
@@ -263,7 +290,8 @@ pub(super) fn add_shafts(
     let mut pass = graph.pass(format!("{technique}.shafts {name}"), PassKind::Compute);
     pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
     pass.read(params, Access::Uniform(Stage::Compute));
-    for image in [gbuffer.view_depth, gbuffer.ids, triangles] {
+    let tile_bounds = inputs.tile_bounds;
+    for image in [gbuffer.view_depth, gbuffer.ids, triangles, tile_bounds] {
         pass.read(image, Access::Sampled(Stage::Compute));
     }
     tiles.read(&mut pass);
@@ -282,6 +310,7 @@ pub(super) fn add_shafts(
             Bind::storage_image(7, shafts),
             Bind::storage_buffer(8, parts.arguments),
             Bind::storage_image(9, parts.tiles),
+            Bind::sampled(10, tile_bounds, nearest),
         ];
         let shader = &spirv::SHAFT_MASKS_SHAFTS_COMP;
         let pipeline = ComputePipelineDesc {

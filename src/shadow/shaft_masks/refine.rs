@@ -18,6 +18,7 @@ use crate::graph::{
 use crate::shadow::{ShadowInputs, Tally};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
+use std::collections::BTreeMap;
 
 /// Texels of a tile: `ESTIMATE_TEXELS` in `shaft_masks/estimates.glsl`.
 const ESTIMATE_TEXELS: u32 = 4;
@@ -73,8 +74,9 @@ pub(super) fn no_estimates(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> 
 
 /// What the estimates say when all is done: `tiles_lit`, `tiles_umbra`, `tiles_penumbra`, which are the
 /// tiles, or parts of one, that some of the light is above; of the last `tiles_256` and `tiles_1024`, which have
-/// so many samples, `tile_entries`, the edges and triangles on their lists, and
-/// `estimated_error_millionths`, of their partly lit pixels.
+/// so many samples, `tile_entries`, the edges and triangles on their lists,
+/// `estimated_error_millionths`, of their partly lit pixels, and `bound_1024ths`, the largest bound of
+/// a pixel where bounds were made.
 pub(super) fn tally(estimates: ImageId) -> Tally {
     let image = estimates;
     Tally { image, count }
@@ -106,7 +108,25 @@ fn count(texels: &[u32]) -> Vec<(&'static str, u64)> {
             penumbra().map(|tile| u64::from(tile[3])).sum(),
         ),
         ("estimated_error_millionths", (1.0e6 * error).round() as u64),
+        (BOUND, penumbra().map(bound_parts).max().unwrap_or(0)),
     ]
+}
+
+/// The counter of the largest bound: a number of cells, of 1024.
+const BOUND: &str = "bound_1024ths";
+
+fn bound_parts(tile: &[u32]) -> u64 {
+    (f32::from_bits(tile[1]) * 1024.0) as u64
+}
+
+/// The bound asked for and the largest one of any pixel, if that is above it.
+pub(in crate::shadow) fn missed_bound(
+    options: &ShaftOptions,
+    counters: &BTreeMap<String, u64>,
+) -> Option<[f32; 2]> {
+    let asked = options.bound?;
+    let reached = *counters.get(BOUND)? as f32 / 1024.0;
+    (reached > asked).then_some([asked, reached])
 }
 
 /// The rounds after the first masks.
@@ -368,5 +388,45 @@ impl Choice<'_> {
             ..masks.lists
         };
         (estimates, spent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_are_missed_by_what_any_pixel_is_above() {
+        // Lit; 64 samples with 5 cells undecided; 1024 with 79.
+        let parts = |parts: f32| (parts / 1024.0).to_bits();
+        let tiles = [
+            0,
+            parts(0.0),
+            LEVEL_LIT,
+            0,
+            0,
+            parts(80.0),
+            1,
+            0,
+            0,
+            parts(79.0),
+            3,
+            0,
+        ];
+        let counted: BTreeMap<String, u64> = count(&tiles)
+            .into_iter()
+            .map(|(name, n)| (name.to_string(), n))
+            .collect();
+        assert_eq!(counted[BOUND], 80);
+        let missed = |bound| {
+            let options = ShaftOptions {
+                bound,
+                ..ShaftOptions::DEFAULT
+            };
+            missed_bound(&options, &counted)
+        };
+        assert_eq!(missed(None), None);
+        assert_eq!(missed(Some(80.0 / 1024.0)), None);
+        assert_eq!(missed(Some(0.078)), Some([0.078, 80.0 / 1024.0]));
     }
 }

@@ -190,7 +190,7 @@ void main() {
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {
             from[i] = projection_from(receivers[i], row_rise());
             sums[i] = 0;
-            [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
+            for (uint r = 0u; r < ROWS; ++r) {
                 digits[i][r] = NO_DIGITS;
             }
         }

@@ -74,7 +74,7 @@ vec2 light_quads[ROWS];
 
 void fetch_light_rows(uint block) {
     uint across = params.pattern.x;
-    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
+    for (uint r = 0u; r < ROWS; ++r) {
         light_rows[r] = params.rows[block / across * ROWS + r];
         light_rows[r].z -= float(block % across * COLUMNS);
         light_quads[r] = 4.0 * light_rows[r].yz + vec2(0.0, 1.5);
@@ -187,7 +187,7 @@ void count_edge(Projection projection, vec3 from, vec3 to, uint code, inout uint
     weight = edge.ends ? -weight : weight;
     uint step = ONE_DIGIT * uint(weight);
     uint quads = 0u;
-    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
+    for (uint r = 0u; r < ROWS; ++r) {
         uint before = crosses(light_rows[r], edge.side) ? quads_before_side(r, edge.side) : 32u;
         digits[r] += before < 32u ? step << before : 0u;
         quads += before;
@@ -199,7 +199,7 @@ void count_edge(Projection projection, vec3 from, vec3 to, uint code, inout uint
 uvec2 counted_mask(uint digits[ROWS], int sum, out bool fits) {
     uvec2 blocked = uvec2(0u);
     uint total = 0u;
-    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
+    for (uint r = 0u; r < ROWS; ++r) {
         uint pairs = (digits[r] & 0x0f0f0f0fu) + (digits[r] >> 4 & 0x0f0f0f0fu);
         total += pairs * 0x01010101u >> 24;
         uint off = digits[r] ^ NO_DIGITS;
@@ -258,7 +258,7 @@ void add_whole(Projection projection, vec3 corner_a, vec3 corner_b, vec3 corner_
     Side whole = side_between(first, last);
     Side lower = side_between(first, middle);
     Side upper = side_between(middle, last);
-    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
+    for (uint r = 0u; r < ROWS; ++r) {
         vec4 row = light_rows[r];
         bool below = row.x < middle.y;
         Side other = Side(below ? lower.low : upper.low, 0.0, below ? lower.slope : upper.slope);
@@ -291,7 +291,7 @@ uvec2 mask_of_line(vec3 line) {
     float at = line.z * inverse;
     uint flip = across < 0.0 ? 0xffu : 0u;
     uvec2 within = uvec2(0u);
-    [[unroll]] for (uint r = 0u; r < ROWS; ++r) {
+    for (uint r = 0u; r < ROWS; ++r) {
         precise float place = slope * light_rows[r].x + at;
         uint row = (0xffu << columns_before(r, place) ^ flip) & 0xffu;
         within[r / 4u] |= row << (8u * (r % 4u));

@@ -223,8 +223,6 @@ fn nothing_is_full_light_and_a_cover_is_none() {
     }
 }
 
-/// Kernels that reached out of the image would let light in around a cover that ends where the
-/// image does.
 /// Ground and a sheet that stands on it: neither has anything between itself and the light, which
 /// shines past the upright sheet's plane in part.
 #[test]
@@ -258,6 +256,47 @@ fn without_casters_there_are_no_slices() {
     }
 }
 
+/// Textures, and sums over them, are made of the slices that hold something and of no others.
+#[test]
+fn empty_slices_are_left_out() {
+    let _one = support::serial();
+    let bar = |depth: f32| plate("bar", [-0.3, 0.3], [-1.0, 1.0], depth);
+    let rows = |depths: &[f32]| {
+        let bars = depths.iter().map(|depth| bar(*depth));
+        scene(bars.chain([floor()]).collect(), square(1.0))
+    };
+    let all: Vec<f32> = (0..24).map(|i| 3.0 + 0.2 * i as f32).collect();
+    // Slices reach from the first bar to the last in both.
+    for (depths, few) in [(&[all[0], all[23]][..], true), (&all, false)] {
+        // Groups of tables by 8, and by 4.
+        for (options, most) in [("slices=32", 32), ("slices=16,combine=bounded", 16)] {
+            let request = request(&camera(), [SIZE; 2], options);
+            let light = with_renderer(&rows(depths), |renderer| {
+                renderer.render_counted(&request).unwrap().lights.remove(0)
+            });
+            let count = |name: &str| light.counters[name];
+            let (filled, textures) = (count("slices_filled"), count("textures"));
+            if few {
+                // A bar may touch the plane between two slices.
+                assert!((2..=4).contains(&filled), "{:?}", light.counters);
+                assert_eq!(textures, filled);
+            } else {
+                assert!(filled > 16 && textures <= most, "{:?}", light.counters);
+            }
+            assert!(count("slices_empty") >= if few { 24 } else { 1 });
+            let sets = if options.contains("bounded") { 2 } else { 1 };
+            let layers = [4, 8].map(|groups| sets * textures.div_ceil(groups));
+            assert!(
+                layers.contains(&count("tables_summed")),
+                "{:?}",
+                light.counters
+            );
+        }
+    }
+}
+
+/// Kernels that reached out of the image would let light in around a cover that ends where the
+/// image does.
 #[test]
 fn kernels_stay_within_the_image() {
     let _one = support::serial();

@@ -1,6 +1,7 @@
 #version 460
 // Finds the fine slices that hold anything, and joins neighbours until there are as many groups as
-// were asked for: none is spent on empty space, and none spans more than it must.
+// were asked for: none is spent on empty space, and none spans more than it must. What is done for each
+// group is dispatched for those that there are.
 
 #include "occlusion_textures/groups.glsl"
 
@@ -16,14 +17,31 @@ layout(set = 0, binding = 1, std140) uniform PlaneBlock {
 layout(set = 0, binding = 2, std140) writeonly buffer GroupBlock {
     SliceGroups groups;
 };
-layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2D report; // 4x1, as groups.count
+layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2D report; // 5x1: `Slices::counts`
+
+layout(set = 0, binding = 4, std430) writeonly buffer SumBlock {
+    uint dispatches[9]; // workgroups of cells.comp, sat_rows.comp, sat_columns.comp
+};
 
 layout(push_constant) uniform Push {
     uint fine;
     uint most;
     float behind;
     float perspective;
+    uint cells_x; // `Sums`
+    uint cells_y;
+    uint rows;
+    uint columns;
+    uint groups_a_batch;
+    uint groups_a_layer;
+    uint sets;
 } push;
+
+void write_dispatch(uint first, uint x, uint y, uint z) {
+    dispatches[first] = x;
+    dispatches[first + 1u] = y;
+    dispatches[first + 2u] = z;
+}
 
 bool filled(uvec4 bits, uint slice) {
     return (bits[slice >> 5] >> (slice & 31u) & 1u) != 0u;
@@ -83,4 +101,11 @@ void main() {
     imageStore(report, ivec2(1, 0), uvec4(occupied));
     imageStore(report, ivec2(2, 0), uvec4(push.fine - occupied));
     imageStore(report, ivec2(3, 0), uvec4(span));
+    // Of other filters than tables nothing is written.
+    uint layers = push.sets > 0u ? (count + push.groups_a_layer - 1u) / push.groups_a_layer : 0u;
+    uint batches = push.sets > 0u ? (count + push.groups_a_batch - 1u) / push.groups_a_batch : 0u;
+    write_dispatch(0u, push.cells_x, push.cells_y, batches);
+    write_dispatch(3u, push.rows, layers, push.sets);
+    write_dispatch(6u, push.columns, layers, push.sets);
+    imageStore(report, ivec2(4, 0), uvec4(layers * push.sets));
 }

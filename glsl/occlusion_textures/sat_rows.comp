@@ -2,7 +2,6 @@
 // Sums of the cells along rows: the first half of summed-area tables (Crow 1984). Whole numbers
 // throughout, so sums of boxes are exact even where they wrap.
 
-#include "occlusion_textures/groups.glsl"
 #include "occlusion_textures/tables.glsl"
 
 layout(local_size_x = 64) in;
@@ -12,21 +11,19 @@ layout(constant_id = 1) const uint LAYERS = 1u;      // of a set of tables
 layout(constant_id = 2) const uint CELL_LAYERS = 1u; // of a set of cells
 
 layout(set = 0, binding = 0) uniform usampler2DArray cells;
-layout(set = 0, binding = 1, std140) uniform GroupBlock {
-    SliceGroups groups;
-};
-layout(set = 0, binding = 2, rgba32ui) uniform writeonly uimage2DArray tables;
+layout(set = 0, binding = 1, rgba32ui) uniform writeonly uimage2DArray tables;
 
 void main() {
     int side = imageSize(tables).x - 1;
     int row = int(gl_GlobalInvocationID.x);
-    uint table = gl_GlobalInvocationID.y;
+    uint set = gl_GlobalInvocationID.z;
+    uint table = set * LAYERS + gl_GlobalInvocationID.y;
     uint each = PACKED != 0u ? GROUPS_A_PACKED_TEXEL : GROUPS_A_TEXEL;
-    uint first = table % LAYERS * each;
-    if (row >= side || first >= groups.count.x) {
+    uint first = gl_GlobalInvocationID.y * each;
+    if (row >= side) {
         return;
     }
-    int layer = int(table / LAYERS * CELL_LAYERS + first / GROUPS_A_CELL);
+    int layer = int(set * CELL_LAYERS + first / GROUPS_A_CELL);
     uint component = first % GROUPS_A_CELL / 4u;
     uvec4 sum = uvec4(0u);
     imageStore(tables, ivec3(0, row + 1, int(table)), sum);

@@ -390,6 +390,7 @@ impl ReadBacks {
                 sources.push(Source {
                     width: desc.width,
                     height: desc.height,
+                    layers: desc.layers,
                     ..picture(tally.image, 4)
                 });
                 (tally, sources.len() - 1)

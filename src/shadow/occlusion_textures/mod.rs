@@ -36,7 +36,7 @@ pub use options::{Combine, Filter, Fit, OcclusionOptions, Planes, Projection};
 
 use super::receivers::add_receivers;
 use super::unblocked::add_unblocked;
-use super::{ShadowInputs, ShadowMask};
+use super::{ShadowInputs, ShadowMask, Tally};
 use crate::graph::Graph;
 use crate::light::ShapeKind;
 
@@ -67,15 +67,14 @@ pub(super) fn add_passes<'f>(
         let (shape, reason) = (inputs.light.shape, "no caster is in any slice");
         return ShadowMask::new(add_unblocked(graph, inputs, NAME, shape, reason));
     }
-    let sliced: Vec<_> = views
-        .into_iter()
-        .enumerate()
-        .map(|(index, view)| {
-            let slices = slices::add_slices(graph, inputs, &options, &view, index);
-            let filtered = prefilter::add_prefilter(graph, inputs, &options, &slices, index);
-            (slices, filtered)
-        })
-        .collect();
+    let mut counts = slices::create_counts(graph, &inputs.light_name, views.len());
+    let mut sliced = Vec::with_capacity(views.len());
+    for (index, view) in views.iter().enumerate() {
+        let (slices, counted) = slices::add_slices(graph, inputs, &options, view, (index, counts));
+        counts = counted;
+        let filtered = prefilter::add_prefilter(graph, inputs, &options, &slices, index);
+        sliced.push((slices, filtered));
+    }
     let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.reach());
     let mut mask = receivers.visibility;
     for (index, (slices, filtered)) in sliced.iter().enumerate() {
@@ -88,5 +87,11 @@ pub(super) fn add_passes<'f>(
             index,
         );
     }
-    ShadowMask::new(mask)
+    ShadowMask {
+        tally: Some(Tally {
+            image: counts,
+            count: slices::tell,
+        }),
+        ..ShadowMask::new(mask)
+    }
 }

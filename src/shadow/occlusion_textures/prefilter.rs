@@ -1,7 +1,7 @@
 //! Filtering occlusion textures ahead of the pixels.
 
 use super::options::{Combine, Filter, OcclusionOptions};
-use super::slices::Slices;
+use super::slices::{Slices, Sums};
 use super::{NAME, ShadowInputs};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, Graph, ImageDesc, ImageId, ImagePart, PassKind, Stage};
@@ -60,6 +60,42 @@ enum Counted {
     Nearer,
 }
 
+/// Whether a component of a table holds two sums, for a view whose bits are `side` texels across and whose
+/// largest kernel is that part of their area.
+fn is_packed(options: &OcclusionOptions, side: u32, most_kernel: f64) -> bool {
+    // Boxes count texels of the bits; half a texel more on each side is for their borders.
+    let detail = f64::from(options.texels_filtered(most_kernel));
+    let most = (most_kernel.sqrt() * f64::from(side) + 4.0 * detail).powi(2);
+    most < 65_536.0
+}
+
+fn groups_a_layer(packed: bool) -> u32 {
+    if packed {
+        GROUPS_A_PACKED_TEXEL
+    } else {
+        GROUPS_A_TEXEL
+    }
+}
+
+/// How the passes over such a view's tables are dispatched.
+pub(super) fn sums(options: &OcclusionOptions, side: u32, most_kernel: f64) -> Sums {
+    if options.filter != Filter::SummedAreas {
+        return Sums::default();
+    }
+    let packed = is_packed(options, side, most_kernel);
+    let side = side / options.texels_filtered(most_kernel);
+    let [across, down, _] = spirv::OCCLUSION_TEXTURES_CELLS_COMP.groups([side, side, 1]);
+    let [rows, ..] = spirv::OCCLUSION_TEXTURES_SAT_ROWS_COMP.groups([side, 1, 1]);
+    let [columns, ..] = spirv::OCCLUSION_TEXTURES_SAT_COLUMNS_COMP.groups([side + 1, 1, 1]);
+    Sums {
+        cells: [across, down],
+        lines: [rows, columns],
+        groups_a_batch: GROUPS_A_BATCH,
+        groups_a_layer: groups_a_layer(packed),
+        sets: counted(options.combine).len() as u32,
+    }
+}
+
 fn add_tables(
     graph: &mut Graph<'_>,
     name: &str,
@@ -68,17 +104,10 @@ fn add_tables(
 ) -> Filtered {
     let detail = options.texels_filtered(slices.most_kernel);
     let side = slices.side / detail;
-    // Boxes count texels of the bits; half a texel more on each side is for their borders.
-    let bits = f64::from(slices.side);
-    let most = (slices.most_kernel.sqrt() * bits + 4.0 * f64::from(detail)).powi(2);
-    let packed = most < 65_536.0;
-    let each = if packed {
-        GROUPS_A_PACKED_TEXEL
-    } else {
-        GROUPS_A_TEXEL
-    };
+    let packed = is_packed(options, slices.side, slices.most_kernel);
+    let each = groups_a_layer(packed);
     let sets = counted(options.combine);
-    let groups = slices.groups;
+    let sums = slices.sums;
     let cell_layers = options.slices.next_multiple_of(GROUPS_A_BATCH) / GROUPS_A_CELL;
     let cells = add_cells(graph, name, options, slices, cell_layers);
 
@@ -88,39 +117,33 @@ fn add_tables(
     let tables = graph.create_image(format!("{NAME}.tables {name}"), desc.layers(all_layers));
     let mut pass = graph.pass(format!("{NAME}.rows {name}"), PassKind::Compute);
     pass.read(cells, Access::Sampled(Stage::Compute));
-    pass.read(groups, Access::Uniform(Stage::Compute));
+    pass.read(sums, Access::Indirect);
     let tables = pass.overwrite(tables, Access::StorageWrite(Stage::Compute));
     pass.record(move |ctx| {
         let shader = &spirv::OCCLUSION_TEXTURES_SAT_ROWS_COMP;
         let bindings = [
             Bind::sampled(0, cells, SamplerDesc::nearest()).array(),
-            Bind::uniform(1, groups),
-            Bind::storage_image(2, tables).array(),
+            Bind::storage_image(1, tables).array(),
         ];
         let pipeline = ComputePipelineDesc {
             constants: vec![(0, u32::from(packed)), (1, layers), (2, cell_layers)],
             ..ComputePipelineDesc::new(shader)
         };
         ctx.bind_compute(&pipeline, &bindings, &[])?;
-        ctx.dispatch(shader.groups([side, all_layers, 1]));
-        Ok(())
+        ctx.dispatch_indirect(sums, Sums::ROWS)
     });
     let mut pass = graph.pass(format!("{NAME}.columns {name}"), PassKind::Compute);
-    pass.read(groups, Access::Uniform(Stage::Compute));
+    pass.read(sums, Access::Indirect);
     let tables = pass.write(tables, Access::StorageReadWrite(Stage::Compute));
     pass.record(move |ctx| {
         let shader = &spirv::OCCLUSION_TEXTURES_SAT_COLUMNS_COMP;
-        let bindings = [
-            Bind::uniform(0, groups),
-            Bind::storage_image(1, tables).array(),
-        ];
+        let bindings = [Bind::storage_image(0, tables).array()];
         let pipeline = ComputePipelineDesc {
-            constants: vec![(0, u32::from(packed)), (1, layers)],
+            constants: vec![(0, layers)],
             ..ComputePipelineDesc::new(shader)
         };
         ctx.bind_compute(&pipeline, &bindings, &[])?;
-        ctx.dispatch(shader.groups([side + 1, all_layers, 1]));
-        Ok(())
+        ctx.dispatch_indirect(sums, Sums::COLUMNS)
     });
     Filtered {
         image: tables,
@@ -143,13 +166,13 @@ fn add_cells(
     let desc = ImageDesc::new(vk::Format::R32G32B32A32_UINT, side, side);
     let desc = desc.layers(layers * sets.len() as u32);
     let mut cells = graph.create_image(format!("{NAME}.cells {name}"), desc);
-    let (bits, groups) = (slices.bits, slices.groups);
+    let (bits, groups, sums) = (slices.bits, slices.groups, slices.sums);
     let words = options.words();
-    let batches = options.slices.div_ceil(GROUPS_A_BATCH);
     for (first_layer, set) in (0..).step_by(layers as usize).zip(sets) {
         let mut pass = graph.pass(format!("{NAME}.cells {name}"), PassKind::Compute);
         pass.read(bits, Access::Sampled(Stage::Compute));
         pass.read(groups, Access::Uniform(Stage::Compute));
+        pass.read(sums, Access::Indirect);
         let part = ImagePart {
             base_mip: 0,
             mips: 1,
@@ -171,8 +194,7 @@ fn add_cells(
                 ..ComputePipelineDesc::new(shader)
             };
             ctx.bind_compute(&pipeline, &bindings, &[])?;
-            ctx.dispatch(shader.groups([side, side, batches]));
-            Ok(())
+            ctx.dispatch_indirect(sums, Sums::CELLS)
         });
     }
     cells

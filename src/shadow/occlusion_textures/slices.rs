@@ -2,7 +2,7 @@
 
 use super::options::{Combine, OcclusionOptions};
 use super::views::{OcclusionView, SlicedView};
-use super::{NAME, ShadowInputs};
+use super::{NAME, ShadowInputs, prefilter};
 use crate::geometry::{SceneBuffers, SceneIds, SceneShaders, draw_part_with, read_for_draw};
 use crate::gpu::{
     Blend, ComputePipelineDesc, GpuError, GraphicsPipelineDesc, SamplerDesc, Shader, spirv,
@@ -24,6 +24,8 @@ const ATTACHMENTS: u32 = 8;
 pub(super) const MOST_SLICES: u64 = 128;
 /// Words of 32 bits for [`MOST_SLICES`].
 const MOST_WORDS: u32 = 4;
+/// Numbers that are counted in a view.
+const COUNTS: u32 = 5;
 /// Texels of the bits across one of the pyramid's first level.
 const ANY_BASE: u32 = 4;
 
@@ -40,6 +42,8 @@ pub(super) struct Slices {
     pub groups: BufferId,
     /// Depths of the planes between fine slices: a uniform buffer.
     pub planes: BufferId,
+    /// Of the passes over tables: two dispatches, [`Sums::CELLS`] and so on, of no more than groups need.
+    pub sums: BufferId,
     /// Texels of the bits across.
     pub side: u32,
     /// The largest kernel's part of the image's area, 0 to 1.
@@ -65,18 +69,69 @@ struct GroupsPush {
     most: u32,
     behind: f32,
     perspective: f32,
+    sums: Sums,
 }
 
+/// How the passes over tables are dispatched: workgroups for each layer, and groups that a layer holds.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub(super) struct Sums {
+    /// Across and down the cells.
+    pub cells: [u32; 2],
+    /// Over the rows, and over the columns, of a table.
+    pub lines: [u32; 2],
+    /// Groups that an invocation of the cells counts.
+    pub groups_a_batch: u32,
+    /// Groups that a layer of a table holds.
+    pub groups_a_layer: u32,
+    /// Sets of tables.
+    pub sets: u32,
+}
+
+impl Sums {
+    /// Places of the dispatches in [`Slices::sums`].
+    pub(super) const CELLS: u64 = 0;
+    pub(super) const ROWS: u64 = 12;
+    pub(super) const COLUMNS: u64 = 24;
+    const BYTES: u64 = 36;
+}
+
+/// R32_UINT, 5x1, a layer for each view: groups, fine slices that hold something, those that do not, fine
+/// slices that a group may span, and layers of tables that are summed.
+pub(super) fn create_counts(graph: &mut Graph<'_>, light_name: &str, views: usize) -> ImageId {
+    let counts = ImageDesc::new(vk::Format::R32_UINT, COUNTS, 1).layers(views as u32);
+    graph.create_image(format!("{NAME}.counts {light_name}"), counts)
+}
+
+/// What is told of the counts.
+pub(super) fn tell(counts: &[u32]) -> Vec<(&'static str, u64)> {
+    let of = |at: usize| {
+        let views = counts.chunks(COUNTS as usize);
+        views
+            .filter_map(|view| view.get(at))
+            .map(|n| u64::from(*n))
+            .sum()
+    };
+    vec![
+        ("textures", of(0)),
+        ("slices_filled", of(1)),
+        ("slices_empty", of(2)),
+        ("tables_summed", of(4)),
+    ]
+}
+
+/// `counts` are those of [`create_counts`], which are returned with the view's written.
 pub(super) fn add_slices<'f>(
     graph: &mut Graph<'f>,
     inputs: &ShadowInputs<'f>,
     options: &OcclusionOptions,
     view: &SlicedView,
-    index: usize,
-) -> Slices {
+    (index, counts): (usize, ImageId),
+) -> (Slices, ImageId) {
     let name = format!("{}.{index}", inputs.light_name);
     let (params, planes) = add_params(graph, &name, view);
     let side = options.texels(inputs.camera.size(), view.most_kernel);
+    let sums = prefilter::sums(options, side, view.most_kernel);
     let fine = options.fine_slices();
     let joined = inputs.scene.features().logic_op;
     let words = if joined { options.words() } else { MOST_WORDS };
@@ -94,16 +149,27 @@ pub(super) fn add_slices<'f>(
         add_packed_marks(graph, inputs, &drawing, bits)
     };
     let any = add_pyramid(graph, &name, bits, side, words);
-    let groups = add_groups(graph, &name, options, (view, side), any, planes);
-    Slices {
+    let part = ImagePart::layer(index as u32);
+    let view_sums = (view, side, sums);
+    let (groups, sums, counts) = add_groups(
+        graph,
+        &name,
+        options,
+        view_sums,
+        (any, planes),
+        (counts, part),
+    );
+    let slices = Slices {
         params,
         bits,
         any,
         groups,
         planes,
+        sums,
         side,
         most_kernel: view.most_kernel,
-    }
+    };
+    (slices, counts)
 }
 
 fn add_params(graph: &mut Graph<'_>, name: &str, view: &SlicedView) -> (BufferId, BufferId) {
@@ -322,28 +388,28 @@ fn add_groups(
     graph: &mut Graph<'_>,
     name: &str,
     options: &OcclusionOptions,
-    (view, side): (&SlicedView, u32),
-    any: ImageId,
-    planes: BufferId,
-) -> BufferId {
+    (view, side, sums): (&SlicedView, u32, Sums),
+    (any, planes): (ImageId, BufferId),
+    (counts, part): (ImageId, ImagePart),
+) -> (BufferId, BufferId, ImageId) {
     let size = 16 + 3 * 16 * MOST_SLICES;
     let groups = graph.create_buffer(format!("{NAME}.groups {name}"), BufferDesc { size });
-    // Groups, occupied and empty fine slices, fine slices that a group may span: for those who ask
-    // for the image.
-    let counts = ImageDesc::new(vk::Format::R32_UINT, 4, 1);
-    let counts = graph.create_image(format!("{NAME}.counts {name}"), counts);
+    let size = Sums::BYTES;
+    let dispatches = graph.create_buffer(format!("{NAME}.sums {name}"), BufferDesc { size });
     let side = (side / ANY_BASE).max(1);
     let last = ImagePart::mip(ImageDesc::new(vk::Format::R32_UINT, side, side).max_mips() - 1);
     let mut pass = graph.pass(format!("{NAME}.groups {name}"), PassKind::Compute);
     pass.read_part(any, last, Access::Sampled(Stage::Compute));
     pass.read(planes, Access::Uniform(Stage::Compute));
     let groups = pass.overwrite(groups, Access::StorageWrite(Stage::Compute));
-    let counts = pass.overwrite(counts, Access::StorageWrite(Stage::Compute));
+    let counts = pass.overwrite_part(counts, part, Access::StorageWrite(Stage::Compute));
+    let dispatches = pass.overwrite(dispatches, Access::StorageWrite(Stage::Compute));
     let push = GroupsPush {
         fine: options.fine_slices(),
         most: options.slices,
         behind: view.params.forward[3],
         perspective: view.params.scale[2],
+        sums,
     };
     let thin = u32::from(options.combine == Combine::Thin);
     let middle = u32::from(options.middle);
@@ -352,7 +418,8 @@ fn add_groups(
             Bind::sampled(0, any, SamplerDesc::nearest()).part(last),
             Bind::uniform(1, planes),
             Bind::storage_buffer(2, groups),
-            Bind::storage_image(3, counts),
+            Bind::storage_image(3, counts).part(part),
+            Bind::storage_buffer(4, dispatches),
         ];
         let pipeline = ComputePipelineDesc {
             constants: vec![(0, thin), (1, middle)],
@@ -362,5 +429,5 @@ fn add_groups(
         ctx.dispatch([1, 1, 1]);
         Ok(())
     });
-    groups
+    (groups, dispatches, counts)
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Everything a change must pass: format, lints, tests, documentation, and the GPU tests on each software driver at hand.
-# Runs all steps even after one fails, lists them with their durations, and fails if one did. GPU tests run in two processes
-# at a time, each of which runs its tests one by one.
+# Runs all steps even after one fails, lists them with their durations, and fails if one did. After the build, two
+# processes go on at a time; tests that open a device run one by one in theirs.
 set -euo pipefail
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -45,20 +45,9 @@ done
 started=$SECONDS
 summary=()
 failed=0
-step() {
-    local name=$1 begin=$SECONDS verdict=ok
-    shift
-    printf '\n==> %s\n' "$name"
-    if ! "$@"; then
-        verdict=FAILED
-        failed=1
-    fi
-    summary+=("$(printf '%-6s %5d s  %s' "$verdict" $((SECONDS - begin)) "$name")")
-    printf '%s\n' "--- ${summary[-1]}"
-}
 
-# Much of a GPU test is one thread's work (compiling pipelines, validation, rays of the truth), so two
-# processes at a time finish sooner than one. What they print comes out whole, when a job is done.
+# Much of a GPU test is one thread's work (compiling pipelines, validation, rays of the truth), as is much of a
+# build, so two processes at a time finish sooner than one. What they print comes out whole, when a job is done.
 jobs_dir=$(mktemp -d)
 trap 'rm -rf "$jobs_dir"' EXIT
 job_names=()
@@ -95,10 +84,12 @@ show_jobs() {
     done
 }
 # What of the other files is the same whatever the driver: that the validation layer sees a missing barrier,
-# arguments and file names of the program.
+# arguments and file names of the program, its files. That a frame is the same in every run, `capture_stress` asks of
+# all techniques on all drivers.
 anywhere=(random_graphs_without_one_of_their_barriers choice:: failures:: interrupted::
     help_and_version_go formats_follow_the_ending lights_are_chosen_by an_image_says_how_bright
     a_report_counts_tiles a_scene_without_a_camera_is graph_prints_the_plan techniques_are_listed
+    visibility_is_the_same_in_every_run a_failing_frame_is_named termination_leaves_whole
     wrong_names_of_images_exit_2 light_in_the_name_of_a_picture)
 gpu_job() {
     if [ ${#gpu_tests[@]} -eq 0 ]; then return; fi
@@ -125,25 +116,41 @@ on() {
     unset ANTUMBRA_TEST_FEWER
 }
 
-step "format" cargo fmt --check
-step "lints" cargo clippy --all-targets -- -D warnings
-step "lints of the library without default features" cargo clippy --no-default-features -- -D warnings
-step "unit and graph tests" cargo test --lib --bins --examples "${other_tests[@]}"
-step "documentation examples" cargo test --doc
-step "documentation" env RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
+lints() {
+    local code=0
+    cargo clippy --all-targets -- -D warnings || code=1
+    cargo clippy --no-default-features -- -D warnings || code=1
+    return $code
+}
+documentation() {
+    RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
+}
 
-step "build of the GPU tests" cargo test --no-run "${gpu_tests[@]}" --test capture_stress
+start_job "format" cargo fmt --check
+# All at once, for linking and much of compiling are one thread's work.
+start_job "build of the tests" cargo test --no-run
+wait "${job_pids[1]}" || true
+if [ "$(cut -d ' ' -f 1 "$jobs_dir/1.result")" != 0 ]; then
+    show_jobs
+    fail "the tests do not build"
+fi
+
 # Drivers ask for the same truth.
 export ANTUMBRA_TEST_TRUTH=$jobs_dir/truth
 mkdir "$ANTUMBRA_TEST_TRUTH"
 # The longest first, so that both processes end at about the same time. All relations over all stress scenes take
-# minutes: once, and elsewhere each scene by itself.
+# minutes: once, and elsewhere each scene by itself. Cargo builds one thing at a time: lints and documentation are done
+# before the second process goes on with tests.
 on swiftshader driver_job
+start_job "lints" lints
+start_job "documentation" documentation
 stress_job "the system's lavapipe"
 gpu_job "the system's lavapipe"
 on swiftshader stress_job every_case
 on lavapipe driver_job
 on lavapipe stress_job every_case
+start_job "unit and graph tests" cargo test --lib --bins --examples "${other_tests[@]}"
+start_job "documentation examples" cargo test --doc
 show_jobs
 
 printf '\n'

@@ -236,13 +236,11 @@ fn dumps_hold_the_frames_own_numbers() -> Result {
     let dump = |name: &str, file: &str| format!("{name}={}", at(file).display());
     capture(
         capture_command(&scene, "40x30")
-            .args(["--technique", "hard"])
             .arg("-o")
             .arg(at("plain.exr")),
     )?;
     let text = capture(
         capture_command(&scene, "40x30")
-            .args(["--technique", "hard"])
             .arg("--validation")
             .arg("-o")
             .arg(at("picture.exr"))

@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use super::program::{Result, assert_fails, capture, capture_command, run};
+use super::program::{Result, assert_fails, capture, default_capture_command, run};
 
 const LIGHTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/lights.gltf");
 
@@ -13,7 +13,7 @@ fn a_choice_is_reported_and_can_be_made_again() -> Result {
     let folder = tempfile::tempdir()?;
     let at = |name: &str| folder.path().join(name);
     let text = capture(
-        capture_command(LIGHTS, "48x48")
+        default_capture_command(LIGHTS, "48x48")
             .args([
                 "--technique",
                 "auto",
@@ -49,7 +49,7 @@ fn a_choice_is_reported_and_can_be_made_again() -> Result {
         }
         let again = at("again.exr");
         capture(
-            capture_command(LIGHTS, "48x48")
+            default_capture_command(LIGHTS, "48x48")
                 .args(["--technique", spec, "--light", &light.to_string()])
                 .arg("--visibility")
                 .arg(&again),

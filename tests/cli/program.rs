@@ -26,8 +26,15 @@ pub fn run<S: AsRef<OsStr>>(args: impl IntoIterator<Item = S>) -> Result<Output>
     Ok(antumbra().args(args).output()?)
 }
 
-/// `capture` on the device that `ANTUMBRA_DEVICE` names, else on the first one.
+/// `capture` by `hard`, whose shaders are the quickest to compile: for what is the same with any technique.
 pub fn capture_command(scene: impl AsRef<OsStr>, size: &str) -> Command {
+    let mut command = default_capture_command(scene, size);
+    command.args(["--technique", "hard"]);
+    command
+}
+
+/// `capture`, without a technique yet, on the device that `ANTUMBRA_DEVICE` names, else on the first one.
+pub fn default_capture_command(scene: impl AsRef<OsStr>, size: &str) -> Command {
     let mut command = antumbra();
     command.arg("capture").arg(scene).args(["--size", size]);
     if let Some(device) = std::env::var_os("ANTUMBRA_DEVICE") {

@@ -15,7 +15,7 @@ unset VK_INSTANCE_LAYERS VK_LOADER_LAYERS_ENABLE VK_LOADER_LAYERS_DISABLE
 # Mesa's implicit layer reorders devices.
 export NODEVICE_SELECT=1
 # Variables set outside would win over those of .cargo/config.toml.
-unset VK_LAYER_PATH VK_ADD_LAYER_PATH LP_NATIVE_VECTOR_WIDTH ANTUMBRA_TEST_FEWER ANTUMBRA_TEST_TRUTH
+unset VK_LAYER_PATH VK_ADD_LAYER_PATH LP_NATIVE_VECTOR_WIDTH ANTUMBRA_TEST_FEWER ANTUMBRA_TEST_ALL ANTUMBRA_TEST_TRUTH
 
 # Nothing is built in small steps in a fresh clone: bookkeeping for later builds would cost a sixth of the time.
 if [ ! -d "${CARGO_TARGET_DIR:-target}/debug/incremental" ]; then export CARGO_INCREMENTAL=0; fi

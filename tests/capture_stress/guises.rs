@@ -8,10 +8,15 @@ use antumbra::shadow::Technique;
 use antumbra::stress::{Case, SCALES, Similarity, cases};
 use glam::{DQuat, DVec3, EulerRot, Vec3};
 
-/// Whether the case of this number is asked of a technique: one that takes its light, and every other
-/// one of those whose frames take long. `scenes::every_case` leaves none out.
+/// Whether the case of this number is asked of a technique: one that takes its light, and every other one, of
+/// those whose frames take long every fourth; techniques take turns. With `ANTUMBRA_TEST_ALL` none is left
+/// out, as in `scenes::every_case`.
 fn is_asked(technique: Technique, case: &Case, number: usize) -> bool {
-    technique.check(case.area_light()).is_ok() && (is_quick(technique) || number.is_multiple_of(2))
+    let turn = techniques().position(|other| other == technique);
+    let every = if is_quick(technique) { 2 } else { 4 };
+    let is_due = (number + turn.unwrap_or(0)).is_multiple_of(every);
+    let all = std::env::var_os("ANTUMBRA_TEST_ALL").is_some();
+    technique.check(case.area_light()).is_ok() && (is_due || all)
 }
 
 /// A uniform scale, and a place far away that is taken out when the file is read, change no more than

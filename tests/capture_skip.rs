@@ -13,8 +13,8 @@ use glam::Vec3;
 use support::plates::{SIZE, camera, floor, plate, scene};
 use support::rig::with_renderer;
 
-/// Techniques that have nothing to do where nothing blocks, each with a light that it can do.
-const TECHNIQUES: [&str; 7] = [
+/// Techniques that have nothing to do where nothing blocks.
+const TECHNIQUES: [&str; 8] = [
     "hard",
     "pcf",
     "pcss",
@@ -22,8 +22,17 @@ const TECHNIQUES: [&str; 7] = [
     "mdi",
     "ssoc",
     "dbuffer",
+    "oess",
 ];
 const DISK: LightShape = LightShape::Disk { radius: 0.5 };
+
+/// A light that a technique can do.
+fn light_of(technique: &str) -> LightShape {
+    match technique {
+        "oess" => LightShape::Line { length: 1.0 },
+        _ => DISK,
+    }
+}
 
 fn request(technique: &str) -> FrameRequest {
     FrameRequest {
@@ -73,11 +82,12 @@ fn assert_reason(plan: &Plan, name: &str, reason: &str) {
 #[test]
 fn nothing_that_blocks_takes_no_technique() {
     let _one = support::serial();
-    let beside = scene(vec![floor(), beside()], DISK);
     for technique in TECHNIQUES {
+        let shape = light_of(technique);
+        let beside = scene(vec![floor(), beside()], shape);
         let request = request(technique);
         let full = with_renderer(&beside, |renderer| renderer.render(&request).unwrap());
-        let frame = with_renderer(&floor_under(DISK), |renderer| {
+        let frame = with_renderer(&floor_under(shape), |renderer| {
             renderer.render(&request).unwrap()
         });
         assert_eq!(passes(&frame, technique), [".unblocked"]);
@@ -146,20 +156,23 @@ fn both_sides_of_a_floor_are_the_same_without_the_technique() {
 fn no_receiver_takes_no_technique() {
     let _one = support::serial();
     let blocked = vec![floor(), plate("blocker", [-2.0, 0.0], [-2.0, 2.0], 5.0)];
-    let mut away = scene(blocked.clone(), DISK);
-    away.lights[0].light.direction = Vec3::Y;
     let mut up = camera();
     (up.forward, up.up) = (Vec3::Y, Vec3::Z);
     for technique in TECHNIQUES {
+        let mut away = scene(blocked.clone(), light_of(technique));
+        away.lights[0].light.direction = Vec3::Y;
         let mut request = request(technique);
-        let dark = with_renderer(&away, |renderer| renderer.render(&request).unwrap());
-        assert_eq!(passes(&dark, technique).len(), 1, "{technique}");
-        assert_reason(&dark.plan, technique, "behind the light");
-        assert_reason(&dark.plan, "shade.light", "behind it");
+        // A line shines to all sides.
+        if light_of(technique) == DISK {
+            let dark = with_renderer(&away, |renderer| renderer.render(&request).unwrap());
+            assert_eq!(passes(&dark, technique).len(), 1, "{technique}");
+            assert_reason(&dark.plan, technique, "behind the light");
+            assert_reason(&dark.plan, "shade.light", "behind it");
+        }
 
         request.camera = up.clone();
         request.camera.position.y = 7.0;
-        let lit = scene(blocked.clone(), DISK);
+        let lit = scene(blocked.clone(), light_of(technique));
         let empty = with_renderer(&lit, |renderer| renderer.render(&request).unwrap());
         assert_eq!(passes(&empty, technique).len(), 1, "{technique}");
         assert_reason(&empty.plan, technique, "in view");

@@ -419,11 +419,11 @@ impl Technique {
         match self {
             Self::Hard => Some(LightShape::Point),
             Self::Pcf(_) | Self::Pcss(_) | Self::OcclusionTextures(_) => Some(light.shape),
-            // What of an uneven light is above a horizon takes rays.
-            Self::Mdi(_) => (!light.is_uneven()).then_some(light.shape),
+            // What of an uneven light is above a horizon takes more than the pass of horizons knows.
+            Self::Mdi(_) | Self::Oess(_) => (!light.is_uneven()).then_some(light.shape),
             Self::Ssoc(options) => (!options.falloff).then_some(light.shape),
             Self::Dbuffer(options) => options.unblocked_shape(light),
-            Self::Oess(_) | Self::ShaftMasks(_) => None,
+            Self::ShaftMasks(_) => None,
             // The technique that is chosen says.
             Self::Auto(_) => None,
         }

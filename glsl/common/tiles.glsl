@@ -37,6 +37,14 @@ ivec2 tile_entry_place(uint index, uvec2 tiles) {
     return ivec2(index % tiles.x, index / tiles.x);
 }
 
+// The entry of a list that a workgroup takes, of so many: 16 workgroups in a row take entries from all over the list.
+// Neighbours in a list are neighbours in the picture, and what they take differs a hundredfold: a driver that gives
+// each core one part of the dispatch gives all of them the same share of work so.
+uint spread_entry(uint index, uint count) {
+    uint rows = count / 16u;
+    return index < 16u * rows ? index % rows * 16u + index / rows : index;
+}
+
 uvec2 tile_of_entry(uint entry, uvec2 tiles) {
     return uvec2(entry % tiles.x, entry / tiles.x);
 }

@@ -8,7 +8,9 @@
 #include "silhouettes/edges.glsl"
 #include "shaft_masks/shaft.glsl"
 
-layout(local_size_x = 64) in;
+const uint LANES = 32u;
+
+layout(local_size_x = LANES) in;
 
 layout(set = 0, binding = 0, std140) uniform Block {
     DbufferParams params;
@@ -55,8 +57,9 @@ vec4 fetch_point_texel(ivec2 place) {
     return texelFetch(points, place, 0);
 }
 
-// What signs of heights over a face may be wrong by, as a part of the product of lengths.
-const float ROUNDING = 4.0e-6;
+// What signs of heights over a face may be wrong by, as a part of the product of the lengths that they are made
+// from: of a sliver the height itself is a small part of that, and its sign may be rounding's alone.
+const float ROUNDING = 1.0e-6;
 
 // A box around the tile's surfaces: shaft_masks/shafts.comp.
 struct SurfaceBox {
@@ -76,11 +79,13 @@ SurfaceBox fetch_surface_box(uvec2 tile) {
 
 // 1 or -1 where all of the box is on that side of a face, else 0.
 float side_of_box(SurfaceBox box, vec3 a, vec3 along, uint corner) {
-    vec3 n = cross(along, fetch_point(corner).xyz - a);
+    vec3 across = fetch_point(corner).xyz - a;
+    vec3 n = cross(along, across);
     vec3 from = box.center - a;
     vec3 reach = abs(n * box.half_axes);
     float extent = reach.x + reach.y + reach.z;
-    float slack = ROUNDING * length(n) * length(from) + ROUNDING * extent;
+    float size = length(from) + length(box.half_axes[0]) + length(box.half_axes[1]) + length(box.half_axes[2]);
+    float slack = ROUNDING * length(along) * length(across) * size;
     float height = dot(n, from);
     return height > extent + slack ? 1.0 : (height < -extent - slack ? -1.0 : 0.0);
 }
@@ -102,8 +107,13 @@ bool meets(Shaft shaft, sampler2D from, uint box) {
 }
 
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    uint block = gl_WorkGroupID.y;
+    // Blocks one after the other, tile by tile: those at the end may be empty.
+    uint block = gl_WorkGroupID.x;
+    uint groups = (arguments.count + LANES - 1u) / LANES;
+    if (gl_WorkGroupID.y >= groups) {
+        return;
+    }
+    uint index = spread_entry(gl_WorkGroupID.y, groups) * LANES + gl_LocalInvocationID.x;
     if (index >= arguments.count) {
         return;
     }

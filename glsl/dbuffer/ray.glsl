@@ -18,6 +18,8 @@ const uint CUTOUT = 2u;
 // know.
 const uint MOST_STEPS = 24576u;
 
+const uint NO_TRIANGLE = 0xffffffffu;
+
 // Whether a triangle is between p and p + to (of a sun: anywhere along to), and no hole is there. Shared
 // edges belong to both triangles, so no ray passes between them. Nearer than rounding_m it is the
 // receiver's own, or one with it.
@@ -56,13 +58,11 @@ bool ray_is_blocked(vec3 p, vec3 to, bool sun, uint nodes, float rounding_m, uin
     bool blocked = false;
     uint node = 0u;
     while (node < nodes && steps < MOST_STEPS) {
-        steps += 1u;
-        vec4 low = fetch_node_low(node);
-        uint next = node + 1u;
-        if (low.w >= 0.0) {
-            blocked = ray_meets_triangle(p, to, sun, uint(low.w), rounding_m, kinds);
-            next = blocked ? nodes : next;
-        } else {
+        // Boxes until one holds a triangle: vector units test triangles for all of their lanes or for none.
+        uint triangle = NO_TRIANGLE;
+        while (node < nodes && steps < MOST_STEPS && triangle == NO_TRIANGLE) {
+            steps += 1u;
+            vec4 low = fetch_node_low(node);
             // Boxes wider by the rounding: those of level triangles are flat.
             vec3 near = (low.xyz - rounding_m - p) * inverse;
             vec3 far = (fetch_node_high(node).xyz + rounding_m - p) * inverse;
@@ -70,9 +70,16 @@ bool ray_is_blocked(vec3 p, vec3 to, bool sun, uint nodes, float rounding_m, uin
             vec3 last = max(near, far);
             float enter = max(first.x, max(first.y, max(first.z, 0.0)));
             float leave = min(last.x, min(last.y, min(last.z, most)));
-            next = enter <= leave ? next : uint(-low.w);
+            bool is_leaf = low.w >= 0.0;
+            bool is_met = enter <= leave;
+            triangle = is_leaf && is_met ? uint(low.w) : NO_TRIANGLE;
+            node = is_leaf || is_met ? node + 1u : uint(-low.w);
         }
-        node = next;
+        if (triangle != NO_TRIANGLE) {
+            steps += 1u;
+            blocked = ray_meets_triangle(p, to, sun, triangle, rounding_m, kinds);
+            node = blocked ? nodes : node;
+        }
     }
     return blocked;
 }

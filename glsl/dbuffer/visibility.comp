@@ -374,7 +374,7 @@ void main() {
     }
     uvec2 size = params.counts.xy;
     uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
-    uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
+    uint entry = texelFetch(list, tile_entry_place(spread_entry(index, arguments.count), tiles), 0).x;
     uvec2 pixel = tile_of_entry(entry, tiles) * TILE_SIZE + gl_LocalInvocationID.xy;
     if (any(greaterThanEqual(pixel, size))) {
         return;

@@ -10,8 +10,8 @@
 // least surfaces are tells whether these are none.
 //
 // Points of the plane have homogeneous coordinates: with L + t E the line and d a point from the receiver,
-// d = w (L + t E). w is 1 on the line, u = w t, and h is the height over the plane. Whether an edge is cut
-// is a matter of the signs of h at its ends, which all edges of a point share: no outline opens by rounding.
+// d = w (L + t E). w is 1 on the line, and u = w t. Whether an edge is cut is a matter of the sides of the plane
+// that its ends are on (turns.glsl).
 
 #include "common/light.glsl"
 #include "common/tiles.glsl"
@@ -21,6 +21,7 @@
 #include "dbuffer/through.glsl"
 #include "oess/params.glsl"
 #include "oess/profile.glsl"
+#include "oess/turns.glsl"
 #include "silhouettes/sides.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -58,6 +59,8 @@ layout(set = 0, binding = 18, std140) uniform ThroughBlock {
     Through through;
 };
 
+layout(set = 0, binding = 19, rgba32f) uniform readonly image2D turns;
+
 #include "dbuffer/ray.glsl"
 
 // Cells of the line above the receiver's plane. One edge within a cell lies exactly where it is, and so do two; of
@@ -73,6 +76,10 @@ const uint MOST_RAYS = 3u;
 
 // Part of the line within which an edge may hide the centre or not by rounding.
 const float NEAR = 1.0 / 4096.0;
+
+// Part of a cell that is too narrow to tell by whether a place of it has fewer surfaces: edges that lie on each other,
+// as those of a triangle without area do, may part by rounding.
+const float NARROW = float(CELLS) * NEAR;
 
 // Square of the sine of the angle at the line's axis within which a receiver sees the line as a point.
 const float ON_AXIS = 1.0e-10;
@@ -128,6 +135,7 @@ struct LineReceiver {
     float rounding_m; // what heights are rounded by
     vec3 from;        // L, from p
     vec3 along;       // E
+    vec2 across;      // across_line
     vec2 range;       // of the line, above the receiver's plane
     vec3 row_u;       // of the coordinates above
     vec3 row_w;
@@ -141,6 +149,7 @@ LineReceiver line_receiver(vec3 p, vec3 n, float rounding_m) {
     r.rounding_m = rounding_m;
     r.from = line.start.xyz - p;
     r.along = line.axis.xyz * line.start.w;
+    r.across = across_line(view.light, p);
     float height_from = dot(n, r.from);
     float height_to = height_from + dot(n, r.along);
     float crossing = height_from / (height_from - height_to);
@@ -154,16 +163,10 @@ LineReceiver line_receiver(vec3 p, vec3 n, float rounding_m) {
     return r;
 }
 
-// Where the receiver's plane cuts an edge, as a part of what is looked at of the line; -1 if nowhere that
-// matters. a, b: ends from the receiver. rises: whether the edge goes from below the plane to above it.
-float edge_place(LineReceiver r, vec3 a, vec3 b, out bool rises) {
-    precise float ha = dot(r.row_h, a);
-    precise float hb = dot(r.row_h, b);
-    rises = hb > 0.0;
-    if ((ha > 0.0) == rises) {
-        return -1.0;
-    }
-    vec3 x = mix(a, b, ha / (ha - hb));
+// Where the receiver's plane cuts an edge that it cuts, as a part of what is looked at of the line; -1 if nowhere
+// that matters. a, b: ends from the receiver; sides: side_of_line of both.
+float edge_place(LineReceiver r, vec3 a, vec3 b, vec2 sides) {
+    vec3 x = mix(a, b, sides.x / (sides.x - sides.y));
     float w = dot(r.row_w, x);
     float t = dot(r.row_u, x) / max(w, 1.0e-30);
     float place = (t - r.range.x) / (r.range.y - r.range.x);
@@ -195,9 +198,9 @@ vec2 extents[CELLS];
 vec2 before_center;
 uint found_edges;
 
-void add_edge(LineReceiver r, uint number, float place, bool rises, float center) {
-    uvec4 edge = fetch_edge(number);
-    float faces = faces_on_one_side(r.p, 1.0, edge, fetch_point(edge.x).xyz, fetch_point(edge.y).xyz);
+// a, b: its ends, scene space.
+void add_edge(LineReceiver r, uint number, vec3 a, vec3 b, float place, bool rises, float center) {
+    float faces = faces_on_one_side(r.p, 1.0, fetch_edge(number), a, b);
     // Along the line one comes to the positive side of the plane through receiver and edge, if the edge rises.
     float change = rises ? faces : -faces;
     float at = place * float(CELLS);
@@ -226,17 +229,23 @@ void add_edges(uint tile, uint tiles, LineReceiver r, float center) {
                     skip_chunk(entries);
                 }
             }
-            float place = -1.0;
-            bool rises = false;
+            bool cut = false;
             uint entry = 0u;
-            while (in_chunk && place < 0.0) {
+            vec2 sides = vec2(0.0);
+            while (in_chunk && !cut) {
                 entry = next_entry(entries, in_chunk);
+                vec4 turn = imageLoad(turns, triangle_texel_place(entry));
+                sides = vec2(side_of_line(r.across, turn.xy), side_of_line(r.across, turn.zw));
+                cut = (sides.x > 0.0) != (sides.y > 0.0);
+            }
+            if (cut) {
                 vec3 a = imageLoad(ends, triangle_texel_place(2u * entry)).xyz;
                 vec3 b = imageLoad(ends, triangle_texel_place(2u * entry + 1u)).xyz;
-                place = edge_place(r, a - r.p, b - r.p, rises);
-            }
-            if (place >= 0.0) {
-                add_edge(r, texelFetch(numbers, triangle_texel_place(entry), 0).x, place, rises, center);
+                float place = edge_place(r, a - r.p, b - r.p, sides);
+                if (place >= 0.0) {
+                    uint number = texelFetch(numbers, triangle_texel_place(entry), 0).x;
+                    add_edge(r, number, a, b, place, sides.y > 0.0, center);
+                }
             }
         }
     }
@@ -258,32 +267,30 @@ float free_part(float most, float number, vec4 cell, vec2 extent) {
     return clamp(part, 0.0, 1.0);
 }
 
+// The better of two places: first fewer surfaces, then more room. x: surfaces; y: the place; z: its room, in cells.
+vec3 better_place(vec3 one, vec3 other, float least) {
+    bool better = other.x >= least && other.z > NARROW
+        && (other.x < one.x || (other.x == one.x && other.z > one.z));
+    return better ? other : one;
+}
+
 // The least number of surfaces that is at least as large as asked for, and a place that has it.
 vec2 least_number(float least, uint count) {
-    float found = count > 0u ? 1.0e9 : max(least, 0.0);
-    float width = 0.0;
-    float place = 0.5;
+    vec3 found = vec3(count > 0u ? 1.0e9 : max(least, 0.0), 0.5, 0.0);
     float number = 0.0;
     for (uint i = 0u; i < count; ++i) {
         vec4 cell = cells[i];
+        // Before its first edge, after its last one, and a gap between two edges.
+        vec2 extent = extents[i];
         float after = number + cell.x;
-        float low = min(number, after);
-        low = low >= least ? low : (max(number, after) >= least ? max(number, after) : 1.0e9);
-        vec2 extent = cell.w == abs(cell.x) ? extents[i] : vec2(cell.y / cell.x);
-        float part = number == after ? 1.0 : (low == number ? extent.x : 1.0 - extent.y);
-        float at = low == number ? 0.5 * part : 1.0 - 0.5 * part;
-        // A gap between two edges in the cell.
-        bool gap = number == after && cell.y > 0.0 && number - cell.z >= least;
-        low = gap ? number - cell.z : low;
-        part = gap ? cell.y / cell.z : part;
-        at = gap ? 0.5 * (extents[i].x + extents[i].y) : at;
-        bool better = low < found || (low == found && part > width);
-        place = better ? (float(i) + at) / float(CELLS) : place;
-        width = better ? part : width;
-        found = min(found, low);
+        float gap = number == after ? cell.y / max(cell.z, 1.0) : 0.0;
+        vec3 places = (float(i) + 0.5 * vec3(extent.x, extent.y + 1.0, extent.x + extent.y)) / float(CELLS);
+        found = better_place(found, vec3(number, places.x, extent.x), least);
+        found = better_place(found, vec3(after, places.y, 1.0 - extent.y), least);
+        found = better_place(found, vec3(number - cell.z, places.z, gap), least);
         number = after;
     }
-    return vec2(found, place);
+    return found.xy;
 }
 
 vec3 to_line(LineReceiver r, float place) {
@@ -386,7 +393,7 @@ void main() {
     }
     uvec2 size = params.counts.xy;
     uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
-    uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
+    uint entry = texelFetch(list, tile_entry_place(spread_entry(index, arguments.count), tiles), 0).x;
     uvec2 pixel = tile_of_entry(entry, tiles) * TILE_SIZE + gl_LocalInvocationID.xy;
     if (any(greaterThanEqual(pixel, size))) {
         return;

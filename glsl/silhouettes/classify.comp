@@ -9,6 +9,9 @@
 // so an edge is no silhouette from anywhere exactly if two faces have opposite signs throughout. No
 // winding and no face normal goes into this; open edges always count, and edges within a flat surface
 // never.
+//
+// Of three faces and more, two on one side and one on the other are no outline: something is on both sides.
+// But the number of surfaces before s changes there all the same, and those who count surfaces need the edge.
 
 #include "common/view_params.glsl"
 #include "silhouettes/edges.glsl"
@@ -31,6 +34,8 @@ layout(push_constant) uniform Push {
 layout(constant_id = 0) const uint LIGHT_SHAPE = 0u;
 // 1: from some point of the light; 0: from its centre.
 layout(constant_id = 1) const uint WHOLE_LIGHT = 0u;
+// 1: edges at which the number of surfaces before the light changes; 0: outlines.
+layout(constant_id = 2) const uint ALL_CHANGES = 0u;
 
 // What signs may be wrong by, as a part of the product of lengths. Within it a face counts as seen
 // from both sides: an edge too many changes nothing, one too few opens a gap.
@@ -92,10 +97,14 @@ bool is_silhouette(uint index) {
     float first = side(edge.z, from, along, to_light);
     float low = first;
     float high = first;
+    float balance = first;
+    bool decided = first != 0.0;
     if ((edge.w & MORE_FACES) == 0u) {
         float second = side(edge.w, from, along, to_light);
         low = min(low, second);
         high = max(high, second);
+        balance += second;
+        decided = decided && second != 0.0;
         if (first == 0.0 && second == 0.0 && is_flat(edge, from, along)) {
             return false;
         }
@@ -104,15 +113,17 @@ bool is_silhouette(uint index) {
         uvec4 more;
         do {
             more = fetch_edge(place);
-            for (uint i = 0u; i < 3u; ++i) {
+            for (uint i = 0u; i < more.w >> 1; ++i) {
                 float other = side(more[i], from, along, to_light);
                 low = min(low, other);
                 high = max(high, other);
+                balance += other;
+                decided = decided && other != 0.0;
             }
             place += 1u;
         } while ((more.w & 1u) != 0u);
     }
-    return low * high > -0.5;
+    return ALL_CHANGES != 0u ? !decided || balance != 0.0 : low * high > -0.5;
 }
 
 void main() {

@@ -40,16 +40,17 @@ float faces_on_one_side(vec3 p, float turn, uvec4 edge, vec3 a, vec3 b) {
     float sum = side_of_face(p, turn, edge.x, a, edge.y, b, edge.z);
     if (edge.w < MORE_FACES) {
         sum += side_of_face(p, turn, edge.x, a, edge.y, b, edge.w);
-    } else if (edge.w != NO_POINT) {
-        uint place = edge.w & ~MORE_FACES;
-        uvec4 more;
-        do {
-            more = fetch_edge(place);
-            for (uint i = 0u; i < more.w >> 1; ++i) {
-                sum += side_of_face(p, turn, edge.x, a, edge.y, b, more[i]);
-            }
-            place += 1u;
-        } while ((more.w & 1u) != 0u);
+    }
+    // Software drivers walk through branches that nobody takes, but not through loops.
+    bool has_more = edge.w >= MORE_FACES && edge.w != NO_POINT;
+    uint place = edge.w & ~MORE_FACES;
+    while (has_more) {
+        uvec4 more = fetch_edge(place);
+        for (uint i = 0u; i < more.w >> 1; ++i) {
+            sum += side_of_face(p, turn, edge.x, a, edge.y, b, more[i]);
+        }
+        place += 1u;
+        has_more = (more.w & 1u) != 0u;
     }
     return sum;
 }

@@ -30,6 +30,10 @@ pub enum SilhouetteRule {
     /// Real-Time Soft Shadows, section 3.1), which misses edges between two faces that both cut the
     /// light.
     WholeLight,
+    /// From some point of the light more faces are on one side of that plane than on the other: there the
+    /// number of surfaces before the light changes. Of at most two faces these are the edges of
+    /// [`WholeLight`](Self::WholeLight); of more it has edges too that are no outlines.
+    Layers,
 }
 
 /// A list of edges on the device.
@@ -121,9 +125,10 @@ pub fn add_silhouettes(
             Bind::sampled(2, points, nearest),
             Bind::storage_buffer(3, masks),
         ];
-        let whole = u32::from(rule == SilhouetteRule::WholeLight);
+        let whole = u32::from(rule != SilhouetteRule::Center);
+        let all_changes = u32::from(rule == SilhouetteRule::Layers);
         let pipeline = ComputePipelineDesc {
-            constants: vec![(0, shape), (1, whole)],
+            constants: vec![(0, shape), (1, whole), (2, all_changes)],
             ..ComputePipelineDesc::new(shader)
         };
         ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&edge_count))?;

@@ -96,6 +96,21 @@ fn texels(format: vk::Format, count: u32) -> ImageDesc {
 }
 
 impl Lists {
+    /// What a pass over the found tiles samples of the picture, the scene and its silhouettes: view depths, triangle
+    /// numbers, triangles, hierarchy, edges, points, and numbers of the silhouettes.
+    pub fn sampled(&self, inputs: &ShadowInputs<'_>) -> [ImageId; 7] {
+        let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
+        [
+            gbuffer.view_depth,
+            gbuffer.ids,
+            ids.triangles,
+            ids.hierarchy,
+            ids.edges,
+            ids.points,
+            self.silhouettes.list,
+        ]
+    }
+
     /// Declares the passes; returns the visibility image too, in which all but the found tiles are
     /// done.
     pub(super) fn add(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> (Found, ImageId) {
@@ -239,7 +254,7 @@ impl Lists {
             let shader = &spirv::DBUFFER_LISTS_COMP;
             ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
             let [groups, ..] = shader.groups([across * down, 1, 1]);
-            ctx.dispatch([groups, blocks, 1]);
+            ctx.dispatch([blocks, groups, 1]);
             Ok(())
         });
         Made {

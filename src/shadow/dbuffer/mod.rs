@@ -114,7 +114,7 @@ pub(super) fn add_edge_lists(
     };
     let name = format!("{technique}.params {}", inputs.light_name);
     let params = add_uniform(graph, name, params);
-    let silhouettes = add_silhouettes(graph, inputs, technique, SilhouetteRule::WholeLight, 1);
+    let silhouettes = add_silhouettes(graph, inputs, technique, SilhouetteRule::Layers, 1);
     let receivers = add_receivers(graph, inputs, technique, shape.reach());
     let (shafts, _) = add_shafts(graph, inputs, (technique, 1), params, &receivers);
     let tools = Lists {
@@ -178,9 +178,9 @@ fn add_visibility<'f>(
     visibility: ImageId,
 ) -> ShadowMask {
     let name = &inputs.light_name;
-    let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
+    let ids = inputs.ids;
     let (view_params, part) = inputs.view_params;
-    let (params, hard, numbers) = (tools.params, tools.hard, tools.silhouettes.list);
+    let (params, hard) = (tools.params, tools.hard);
     let Found {
         pool,
         chunk_boxes,
@@ -193,21 +193,9 @@ fn add_visibility<'f>(
     pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
     pass.read(params, Access::Uniform(Stage::Compute));
     pass.read(through, Access::Uniform(Stage::Compute));
-    let images = [
-        gbuffer.view_depth,
-        gbuffer.ids,
-        ids.triangles,
-        ids.hierarchy,
-        ids.edges,
-        ids.points,
-        numbers,
-        ends,
-        pool,
-        chunk_boxes,
-        lists,
-        hard,
-    ];
-    for image in images.into_iter().chain(ids.mask_images()) {
+    let sampled = tools.sampled(inputs);
+    let found = [ends, pool, chunk_boxes, lists, hard];
+    for image in sampled.into_iter().chain(found).chain(ids.mask_images()) {
         pass.read(image, Access::Sampled(Stage::Compute));
     }
     tiles.read(&mut pass);
@@ -217,19 +205,17 @@ fn add_visibility<'f>(
     let fours = options.samples / 4;
     pass.record(move |ctx| {
         let nearest = SamplerDesc::nearest();
-        let bindings = [
+        let places = [2, 3, 4, 5, 9, 10, 11].into_iter();
+        let sampled = places.zip(sampled);
+        let mut bindings: Vec<Bind> = sampled
+            .map(|(binding, image)| Bind::sampled(binding, image, nearest))
+            .collect();
+        bindings.extend([
             Bind::uniform(0, view_params).part(part),
             Bind::uniform(1, params),
-            Bind::sampled(2, gbuffer.view_depth, nearest),
-            Bind::sampled(3, gbuffer.ids, nearest),
-            Bind::sampled(4, ids.triangles, nearest),
-            Bind::sampled(5, ids.hierarchy, nearest),
             Bind::sampled(6, ids.materials, nearest),
             Bind::sampled(7, ids.triangle_uvs, nearest),
             Bind::sampled(8, ids.texels, nearest),
-            Bind::sampled(9, ids.edges, nearest),
-            Bind::sampled(10, ids.points, nearest),
-            Bind::sampled(11, numbers, nearest),
             Bind::sampled(12, pool, nearest),
             Bind::sampled(13, lists, nearest),
             Bind::sampled(14, hard, nearest),
@@ -239,7 +225,7 @@ fn add_visibility<'f>(
             Bind::uniform(18, through),
             Bind::sampled(19, ends, nearest),
             Bind::sampled(20, chunk_boxes, nearest),
-        ];
+        ]);
         let pipeline = ComputePipelineDesc {
             constants: vec![(0, shape), (1, fours), (2, masked)],
             ..ComputePipelineDesc::new(&spirv::DBUFFER_VISIBILITY_COMP)

@@ -13,9 +13,10 @@
 //! |---|---|
 //! | `map`, `visibility` of `oess.hard` | what sees the line's centre |
 //! | `silhouettes.*`, `boxes`, `start`, `tiles`, `shafts`, `lists`, `through`, `settle` | the edges of each tile: [`super::dbuffer`] |
+//! | `turns` | where edges lie around the line |
 //! | `visibility` | visibility of tiles with edges |
 //!
-//! With the option `outreach=hull`, and where triangles have holes or no area, edges come from maps of the ends. The edge of a
+//! With the option `outreach=hull`, and where triangles have holes, edges come from maps of the ends. The edge of a
 //! texel is the tangent from its surface to the hull of its row, which is the exact one for all that the end
 //! sees, and a scan along the row finds it in linear time (`glsl/oess/outreach.comp`). A receiver then looks
 //! at the triangle at its edge, so that neither texels nor rows show (`glsl/oess/oess.glsl`). The steps as
@@ -117,9 +118,7 @@ pub(super) fn add_passes<'f>(
     if length <= SHORTEST * farthest_receiver(inputs) || inputs.scene.triangle_count() == 0 {
         return hard::add_passes_at(graph, inputs, options.resolution.unwrap_or(MAP_SIZE));
     }
-    // Triangles without area have no sides for an edge to lie between: single pixels beside them are wrong.
-    let has_sides = !inputs.scene.has_masks() && inputs.scene.degenerate_count() == 0;
-    if options.outreach == Outreach::Silhouettes && has_sides {
+    if options.outreach == Outreach::Silhouettes && !inputs.scene.has_masks() {
         let texels = options.resolution.unwrap_or(MAP_SIZE);
         let line = LineParams::new(&inputs.light, length);
         return silhouettes::add_passes(graph, inputs, line, texels);

@@ -7,8 +7,9 @@ mod support;
 use antumbra::capture::{CapturedFrame, FrameRenderer, FrameRequest, plan_frame};
 use antumbra::graph::{FakeMemory, Graph, Plan};
 use antumbra::light::{AreaLight, LightShape};
-use antumbra::renderer::{NamedLight, SceneBuffers, add_frame};
+use antumbra::renderer::{NamedLight, SceneBuffers, add_frame, add_frame_without_shadows};
 use antumbra::scene::{Primitive, Scene};
+use antumbra::shadow::Technique;
 use glam::Vec3;
 use support::plates::{SIZE, camera, floor, plate, scene};
 use support::rig::with_renderer;
@@ -344,5 +345,102 @@ fn what_a_technique_cannot_do_without_is_an_error() {
         );
         assert_eq!(error.lines().count(), 1, "{error}");
         assert_eq!(graph.pass_count(), 0);
+    }
+}
+
+/// A frame in which nothing casts a shadow has the passes and the memory of one with shadows off, with any number
+/// of lights, and the picture of one whose technique found that nothing hides anything.
+#[test]
+fn a_frame_without_shadows_costs_what_shadows_off_cost() {
+    let _one = support::serial();
+    let mut alone = floor_under(DISK);
+    let beside = scene(vec![floor(), beside()], DISK);
+    // What light comes from nowhere in particular depends on the scene's size.
+    alone.bounds = beside.bounds;
+    let buffers = SceneBuffers::plan_only(&alone, true);
+    let of = |count: usize| {
+        let lights = (0..count).map(|index| NamedLight {
+            name: index.to_string(),
+            light: alone.lights[0].light,
+        });
+        lights.collect::<Vec<_>>()
+    };
+    let plan = |technique: Option<&str>, lights: &[NamedLight]| {
+        let mut graph = Graph::new();
+        let (camera, size) = (camera(), [SIZE; 2]);
+        let frame = match technique {
+            Some(name) => {
+                let technique = name.parse().unwrap();
+                add_frame(&mut graph, &buffers, &camera, size, lights, technique).unwrap()
+            }
+            None => add_frame_without_shadows(&mut graph, &buffers, &camera, size, lights),
+        };
+        graph.keep(frame.radiance);
+        let plan = graph.compile(&FakeMemory).unwrap().plan().clone();
+        let names = plan.passes.iter().map(|pass| pass.name.to_string());
+        (names.collect::<Vec<_>>(), plan.peak_bytes())
+    };
+    for technique in TECHNIQUES.iter().chain(&["auto"]) {
+        for count in [1, 3] {
+            let lights = of(count);
+            assert_eq!(
+                plan(Some(technique), &lights),
+                plan(None, &lights),
+                "{technique}"
+            );
+        }
+        let request = request(technique);
+        let [found, skipped] = [&beside, &alone]
+            .map(|scene| with_renderer(scene, |renderer| renderer.render(&request).unwrap().color));
+        assert!(found == skipped, "{technique}");
+    }
+}
+
+/// Several lights take the memory of one, but for each one's mask.
+#[test]
+fn transients_of_several_lights_share_memory() {
+    let blocker = plate("blocker", [-2.0, 0.0], [-2.0, 2.0], 5.0);
+    let mut lit = scene(vec![floor(), blocker], DISK);
+    for index in 1..4 {
+        let mut other = lit.lights[0].clone();
+        other.light.center.x = index as f32;
+        lit.lights.push(other);
+    }
+    for technique in Technique::ALL {
+        let mut blocked = lit.clone();
+        for found in &mut blocked.lights {
+            if technique.name() == "oess" {
+                found.light.shape = LightShape::Line { length: 1.0 };
+            }
+        }
+        let plan = |count: usize| {
+            let request = FrameRequest {
+                lights: (0..count).collect(),
+                technique: *technique,
+                ..request("hard")
+            };
+            plan_frame(&blocked, &request).unwrap()
+        };
+        let [one, four] = [plan(1), plan(4)];
+        // A mask has 4 bytes a pixel, and of a line as many as 12.
+        let masks = 3 * 12 * u64::from(SIZE * SIZE);
+        // Parameters, counts, and what alignment adds.
+        let slack = one.peak_bytes() / 20;
+        let title = format!(
+            "{}: {} bytes for one light, {} for four, {} without sharing",
+            technique.name(),
+            one.peak_bytes(),
+            four.peak_bytes(),
+            four.unaliased_bytes()
+        );
+        println!("{title}");
+        assert!(
+            four.peak_bytes() <= one.peak_bytes() + masks + slack,
+            "{title}"
+        );
+        assert!(
+            four.unaliased_bytes() > 2 * one.unaliased_bytes(),
+            "{title}"
+        );
     }
 }

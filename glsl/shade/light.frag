@@ -10,6 +10,11 @@
 layout(constant_id = 0) const uint LIGHT_SHAPE = 0u;
 // 0 where no surface of the scene shines.
 layout(constant_id = 1) const uint SHINY = 1u;
+// What hides the light: the image's visibility, what of HORIZON_SHAPE is below the surface, or nothing.
+layout(constant_id = 2) const uint SHADOW = 0u;
+layout(constant_id = 3) const uint HORIZON_SHAPE = 0u;
+const uint MASK = 0u;
+const uint NO_SHADOW = 2u;
 
 layout(set = 0, binding = 0, std140) uniform LightBlock {
     ViewParams view;
@@ -38,10 +43,18 @@ void main() {
 
     // Visibility counts what is below the surface's plane as hidden, and irradiance leaves it out:
     // once is enough.
-    float seen = texelFetch(visibility, pixel, 0).x;
-    if (LIGHT_SHAPE != LIGHT_POINT) {
+    float seen = 1.0;
+    if (SHADOW != NO_SHADOW) {
         vec3 g = unpack_unit(texelFetch(geometric_normal, pixel, 0).x);
-        seen = min(seen / max(light_above(view.light, LIGHT_SHAPE, p, g), 1.0e-3), 1.0);
+        float above = light_above(view.light, LIGHT_SHAPE, p, g);
+        if (SHADOW == MASK) {
+            seen = texelFetch(visibility, pixel, 0).x;
+        } else {
+            seen = HORIZON_SHAPE == LIGHT_SHAPE ? above : light_above(view.light, HORIZON_SHAPE, p, g);
+        }
+        if (LIGHT_SHAPE != LIGHT_POINT) {
+            seen = min(seen / max(above, 1.0e-3), 1.0);
+        }
     }
     float diffuse = light_irradiance(view.light, LIGHT_SHAPE, p, n) * (1.0 - surface.y) * INVERSE_PI;
     vec3 reflected = color * diffuse;

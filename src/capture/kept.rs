@@ -3,6 +3,7 @@
 use super::frame::FrameRequest;
 use crate::gpu::{Gpu, GpuError, Image, ImageSpec, Retired};
 use crate::graph::{Access, Graph, HostImage, ImageDesc, ImageId, ImageState, PassKind};
+use crate::light::LightShape;
 use crate::renderer::Frame;
 use crate::shadow::ShadowMask;
 use crate::shadow::auto::Choice;
@@ -17,6 +18,7 @@ pub(super) struct KeptMasks {
 
 struct Kept {
     visibility: Image,
+    unblocked: Option<LightShape>,
     end_influences: Option<Image>,
 }
 
@@ -59,6 +61,7 @@ impl KeptMasks {
             match made {
                 Ok((visibility, Ok(end_influences))) => kept.masks.push(Kept {
                     visibility,
+                    unblocked: mask.unblocked,
                     end_influences,
                 }),
                 Ok((visibility, Err(error))) => {
@@ -113,6 +116,7 @@ impl KeptMasks {
     pub(super) fn import(&self, graph: &mut Graph<'_>) -> Vec<ShadowMask> {
         let masks = self.masks.iter().map(|kept| {
             let mut mask = ShadowMask::new(import(graph, &kept.visibility, BETWEEN));
+            mask.unblocked = kept.unblocked;
             mask.end_influences =
                 (kept.end_influences.as_ref()).map(|image| import(graph, image, BETWEEN));
             mask

@@ -119,6 +119,8 @@ pub(crate) struct Declarations {
     passes: Vec<PassDecl>,
     kept: Vec<usize>,
     skipped: Vec<CulledPass>,
+    /// Passes that begin a part, ascending.
+    parts: Vec<usize>,
     error: Option<GraphError>,
 }
 
@@ -156,6 +158,7 @@ impl<'f> Graph<'f> {
                 passes: Vec::new(),
                 kept: Vec::new(),
                 skipped: Vec::new(),
+                parts: Vec::new(),
                 error: None,
             },
             records: Vec::new(),
@@ -241,6 +244,13 @@ impl<'f> Graph<'f> {
             reason: reason.into(),
         };
         self.decl.skipped.push(skipped);
+    }
+
+    /// Passes that are declared from here on run after all that were declared before, whether they depend on
+    /// them or not. What only passes of one part use then shares memory with what only those of another
+    /// use, at the price of a barrier between the parts where otherwise both would run side by side.
+    pub fn begin_part(&mut self) {
+        self.decl.parts.push(self.decl.passes.len());
     }
 
     /// Number of passes declared so far: the place in [`PlanPass::declared`] that the next one gets.

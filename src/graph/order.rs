@@ -88,7 +88,8 @@ pub(crate) fn live_passes(decl: &Declarations, maps: &[CellMap]) -> Vec<bool> {
 /// Passes of one level touch nothing in common that one of them writes, nor one image in two
 /// layouts, so that all barriers of a level can be issued at once, in front of it. The number of
 /// barrier batches is then the length of the longest chain of dependent passes, the least there
-/// can be. Within a level the order of declaration stays.
+/// can be. Within a level the order of declaration stays. Passes of a part
+/// ([`Graph::begin_part`](super::Graph::begin_part)) stand behind all of the part before.
 pub(crate) fn levels(decl: &Declarations, maps: &[CellMap], live: &[bool]) -> Vec<Vec<usize>> {
     #[derive(Clone)]
     struct Cell {
@@ -105,8 +106,13 @@ pub(crate) fn levels(decl: &Declarations, maps: &[CellMap], live: &[bool]) -> Ve
     };
     let mut cells: Vec<Vec<Cell>> = maps.iter().map(|m| vec![start.clone(); m.len()]).collect();
     let mut levels: Vec<Vec<usize>> = Vec::new();
+    let mut parts = decl.parts.iter().peekable();
+    let mut first = 0;
     for (index, pass) in decl.passes.iter().enumerate().filter(|(i, _)| live[*i]) {
-        let mut level = 0;
+        while parts.next_if(|part| **part <= index).is_some() {
+            first = levels.len() as u32;
+        }
+        let mut level = first;
         for used in &pass.uses {
             let layout = used.access.info().layout;
             for cell in maps[used.resource].cells(used.part) {

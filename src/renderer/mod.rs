@@ -118,6 +118,10 @@ fn visibilities<'f>(
     let mut masks = Vec::with_capacity(lights.len());
     let mut passes = Vec::with_capacity(lights.len());
     for (at, (light, part)) in lights.iter().zip(&parts).enumerate() {
+        if at > 0 {
+            // A light's maps and lists lie where those of the light before were.
+            graph.begin_part();
+        }
         let first = graph.pass_count();
         masks.push(choices[at].technique.add_passes(
             graph,
@@ -195,7 +199,7 @@ pub fn add_frame_of<'f>(
 
 /// As [`add_frame`], with what a technique made of the lights in an earlier frame, in which camera,
 /// lights and scene were the same: no pass of a technique is declared. `masks` are images of this
-/// graph, one for each light.
+/// graph, one for each light; lights beyond the list have no shadows.
 pub fn add_frame_with_masks<'f>(
     graph: &mut Graph<'f>,
     scene: &'f SceneBuffers,
@@ -219,6 +223,18 @@ pub fn add_frame_with_masks<'f>(
     let in_view = survey::receivers(scene, camera, size);
     let surfaces = (gbuffer, pixels);
     shaded(graph, (scene, &ids), surfaces, (lights, &in_view), found)
+}
+
+/// As [`add_frame`] with lights that nothing hides, which is what a frame costs without shadows: there are no
+/// masks and no visibility.
+pub fn add_frame_without_shadows<'f>(
+    graph: &mut Graph<'f>,
+    scene: &'f SceneBuffers,
+    camera: &SceneCamera,
+    size: [u32; 2],
+    lights: &[NamedLight],
+) -> Frame {
+    add_frame_with_masks(graph, scene, camera, size, lights, Vec::new())
 }
 
 /// `in_view` are convex hulls of what the picture can show.

@@ -71,7 +71,7 @@ pub struct ShadingInputs<'a> {
     pub camera: PixelCamera,
     /// The lights.
     pub lights: &'a [NamedLight],
-    /// What the technique made for each light.
+    /// What the technique made for each light; lights beyond the list have no shadows.
     pub masks: &'a [ShadowMask],
     /// A uniform buffer with [`ViewParams`](crate::shadow::ViewParams) of each light.
     pub params: BufferId,
@@ -91,6 +91,11 @@ pub struct Shading {
     /// RGBA32F linear radiance; alpha 1 on surfaces, 0 elsewhere.
     pub radiance: ImageId,
 }
+
+/// What hides a light, as `SHADOW` of `shade/light.frag`: what its mask says, each surface's own horizon, nothing.
+const MASK: u32 = 0;
+const HORIZON: u32 = 1;
+const NO_SHADOW: u32 = 2;
 
 /// Declares the shading passes.
 pub fn add_shading(graph: &mut Graph<'_>, inputs: &ShadingInputs<'_>) -> Shading {
@@ -145,8 +150,15 @@ pub fn add_shading(graph: &mut Graph<'_>, inputs: &ShadingInputs<'_>) -> Shading
             continue;
         }
         let (params, part) = (inputs.params, inputs.parts[index]);
-        let mask = inputs.masks[index].visibility;
         let shape = shape_number(&named.light.shape);
+        // Where no image is needed any other fills its place.
+        let (shadow, horizon, mask) = match inputs.masks.get(index) {
+            None => (NO_SHADOW, shape, gbuffer.view_depth),
+            Some(mask) => match &mask.unblocked {
+                Some(shape) => (HORIZON, shape_number(shape), gbuffer.view_depth),
+                None => (MASK, shape, mask.visibility),
+            },
+        };
         let mut pass = graph.pass(format!("shade.light {}", named.name), PassKind::Graphics);
         pass.read_part(params, part, Access::Uniform(Stage::Fragment));
         let images = [
@@ -157,15 +169,16 @@ pub fn add_shading(graph: &mut Graph<'_>, inputs: &ShadingInputs<'_>) -> Shading
             finish,
             mask,
         ];
-        for image in images {
-            pass.read(image, fragment);
+        let read = if shadow == MASK { 6 } else { 5 };
+        for image in &images[..read] {
+            pass.read(*image, fragment);
         }
         radiance = pass.color(radiance, Load::Keep);
         pass.record(move |ctx| {
             let fragment = Some(&spirv::SHADE_LIGHT_FRAG);
             let mut pipeline = GraphicsPipelineDesc::new(&spirv::SCREEN_FULLSCREEN_VERT, fragment);
             pipeline.blend = Blend::Add;
-            pipeline.constants = vec![(0, shape), (1, shiny)];
+            pipeline.constants = vec![(0, shape), (1, shiny), (2, shadow), (3, horizon)];
             let mut bindings = vec![Bind::uniform(0, params).part(part)];
             let sampled = images.iter().zip(1..);
             bindings

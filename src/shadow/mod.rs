@@ -27,7 +27,7 @@ pub use technique::{Technique, TechniqueError, TechniqueOption};
 
 use crate::geometry::{GBuffer, PixelCamera, SceneBuffers, SceneIds};
 use crate::graph::{BufferId, BufferPart, ImageId};
-use crate::light::AreaLight;
+use crate::light::{AreaLight, LightShape};
 use glam::DVec3;
 use silhouettes::Silhouettes;
 use std::rc::Rc;
@@ -66,6 +66,9 @@ pub struct ShadowInputs<'f> {
 pub struct ShadowMask {
     /// R32F: the part of the light that is seen, 0 to 1; 1 where nothing was hit.
     pub visibility: ImageId,
+    /// Where nothing can block the light: the shape of which `visibility` is what lies above each surface's
+    /// own horizon. Who knows the surface can find that without the image.
+    pub unblocked: Option<LightShape>,
     /// RG32F, of a line: how much of the light that its visible parts give comes from its two
     /// ends, for shading. `None` shades with the visibility alone.
     pub end_influences: Option<ImageId>,
@@ -91,6 +94,7 @@ impl ShadowMask {
     pub fn new(visibility: ImageId) -> Self {
         Self {
             visibility,
+            unblocked: None,
             end_influences: None,
             error_bound: None,
             silhouettes: None,

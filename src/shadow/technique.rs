@@ -449,7 +449,7 @@ impl Technique {
         if let Some(shape) = self.unblocked_shape(&inputs.light)
             && let Some(reason) = why_unblocked(inputs)
         {
-            return ShadowMask::new(add_unblocked(graph, inputs, self.name(), shape, reason));
+            return add_unblocked(graph, inputs, self.name(), shape, reason);
         }
         match self {
             Self::Hard => hard::add_passes(graph, inputs),

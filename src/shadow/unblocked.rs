@@ -1,9 +1,9 @@
 //! Visibility where nothing can block a light: what is above each surface's own horizon.
 
 use super::casters::is_before;
-use super::{ShadowInputs, shape_number};
+use super::{ShadowInputs, ShadowMask, shape_number};
 use crate::gpu::{GraphicsPipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, Graph, ImageDesc, ImageId, Load, PassKind, Stage};
+use crate::graph::{Access, Bind, Graph, ImageDesc, Load, PassKind, Stage};
 use crate::light::LightShape;
 use ash::vk;
 
@@ -23,14 +23,14 @@ pub(super) fn why_unblocked(inputs: &ShadowInputs<'_>) -> Option<&'static str> {
 }
 
 /// Declares the pass that takes the place of a technique's, of a light of that shape, and notes why;
-/// returns the R32F image of visibility.
+/// returns the mask.
 pub(super) fn add_unblocked(
     graph: &mut Graph<'_>,
     inputs: &ShadowInputs<'_>,
     technique: &str,
     shape: LightShape,
     reason: &str,
-) -> ImageId {
+) -> ShadowMask {
     graph.skip(format!("{technique} {}", inputs.light_name), reason);
     let gbuffer = inputs.gbuffer;
     let (view_params, part) = inputs.view_params;
@@ -59,5 +59,8 @@ pub(super) fn add_unblocked(
         ctx.draw(0, 3, 1);
         Ok(())
     });
-    visibility
+    ShadowMask {
+        unblocked: Some(shape),
+        ..ShadowMask::new(visibility)
+    }
 }

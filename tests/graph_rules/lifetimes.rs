@@ -428,3 +428,40 @@ fn an_empty_graph_is_an_empty_plan() {
     assert!(plan.passes.is_empty() && plan.steps.is_empty() && plan.resources.is_empty());
     assert_eq!((plan.peak_bytes(), plan.barrier_count()), (0, 0));
 }
+
+/// Chains that have nothing to do with each other run side by side, unless each is a part of its own: then
+/// their images lie in the same place.
+#[test]
+fn parts_follow_each_other_and_share_memory() {
+    let chains = |parts: bool| {
+        plan(|g| {
+            for name in ["first", "second", "third"] {
+                if parts {
+                    g.begin_part();
+                }
+                let image = g.create_image(format!("{name} map"), desc());
+                let mut pass = g.pass(format!("{name} make"), PassKind::Compute);
+                let image = pass.overwrite(image, WRITE);
+                let answer = g.create_image(format!("{name} answer"), desc());
+                let mut pass = g.pass(format!("{name} use"), PassKind::Compute);
+                pass.read(image, SAMPLED);
+                let answer = pass.overwrite(answer, WRITE);
+                g.keep(answer);
+            }
+        })
+    };
+    let (beside, behind) = (chains(false), chains(true));
+    assert_eq!(step_of(&beside, "third make"), 0);
+    let steps = [
+        "first make",
+        "first use",
+        "second make",
+        "second use",
+        "third make",
+    ];
+    assert_eq!(steps.map(|name| step_of(&behind, name)), [0, 1, 2, 3, 4]);
+    // Three answers, and one map in place of three.
+    let image = desc().width * desc().height * 4;
+    assert_eq!(beside.peak_bytes(), 6 * u64::from(image));
+    assert_eq!(behind.peak_bytes(), 4 * u64::from(image));
+}

@@ -65,7 +65,7 @@ pub(super) fn add_passes<'f>(
     let views = views::sliced_views(&inputs.light, &inputs.receivers, &casters, &options);
     if views.is_empty() {
         let (shape, reason) = (inputs.light.shape, "no caster is in any slice");
-        return ShadowMask::new(add_unblocked(graph, inputs, NAME, shape, reason));
+        return add_unblocked(graph, inputs, NAME, shape, reason);
     }
     let mut counts = slices::create_counts(graph, &inputs.light_name, views.len());
     let mut sliced = Vec::with_capacity(views.len());

@@ -59,13 +59,15 @@ pub(crate) fn is_before(light: &AreaLight, hull: &[DVec3]) -> bool {
     !light.shape.is_one_sided() || hull.iter().any(front)
 }
 
-/// Outward normals of a box's faces, and the offsets of their planes; of a flat box, both sides.
+/// Outward normals of a box's faces, and the offsets of their planes; of a flat box, both sides, and planes at
+/// right angles through its rim.
 fn outer_faces(corners: &[DVec3; 8]) -> Vec<(DVec3, f64)> {
     let edges = [1, 2, 4].map(|i| corners[i] - corners[0]);
     let mut faces = Vec::with_capacity(6);
     for axis in 0..3 {
-        let across = edges[(axis + 1) % 3].cross(edges[(axis + 2) % 3]);
-        let Some(normal) = across.try_normalize() else {
+        let others = [edges[(axis + 1) % 3], edges[(axis + 2) % 3]];
+        let across = others[0].cross(others[1]).try_normalize();
+        let Some(normal) = across.or_else(|| aside(edges[axis], others)) else {
             continue;
         };
         for normal in [normal, -normal] {
@@ -77,6 +79,13 @@ fn outer_faces(corners: &[DVec3; 8]) -> Vec<(DVec3, f64)> {
         }
     }
     faces
+}
+
+/// The direction of an edge that is at right angles to two others, of which one at least has no length.
+fn aside(edge: DVec3, others: [DVec3; 2]) -> Option<DVec3> {
+    let along = others.into_iter().find_map(DVec3::try_normalize);
+    let rest = along.map_or(edge, |along| edge - edge.dot(along) * along);
+    rest.try_normalize()
 }
 
 /// Whether all of a light lies where `normal` . p >= `offset`; of a sun, whether its directions do
@@ -156,6 +165,34 @@ mod tests {
         // A sphere shines there too.
         let sphere = light(LightShape::Sphere { radius: 2.5 }, [0.0, 4.0, 0.0]);
         assert_eq!(block(&sphere, &[above]), [true]);
+    }
+
+    #[test]
+    fn what_stands_aside_shadows_nothing_however_flat() {
+        let ground = boxed([-1.0, 0.0, -1.0], [1.0, 0.0, 1.0]);
+        let sheets = [
+            boxed([5.0, 2.0, -1.0], [6.0, 2.0, 1.0]),
+            boxed([5.0, 0.0, -1.0], [5.0, 2.0, 1.0]),
+            boxed([-1.0, 2.0, 5.0], [1.0, 2.0, 6.0]),
+            boxed([-1.0, 2.0, 5.0], [1.0, 2.0, 5.0]),
+            boxed([0.5, 2.0, -1.0], [6.0, 2.0, 1.0]),
+        ];
+        let disk = light(LightShape::Disk { radius: 0.5 }, [0.0, 4.0, 0.0]);
+        // A line has no sides that could tell where it is.
+        assert_eq!(
+            can_block(&disk, &[hull(&ground)], &sheets),
+            [false, false, false, true, true]
+        );
+        // Sheets that are turned are no exception.
+        let turn = glam::Quat::from_rotation_y(0.4) * glam::Quat::from_rotation_x(0.3);
+        let turned = sheets.map(|corners| corners.map(|corner| turn * corner));
+        let center = turn * disk.center;
+        let turned_light = AreaLight::new(disk.shape, center, turn * Vec3::NEG_Y, turn * Vec3::X);
+        let ground = ground.map(|corner| turn * corner);
+        assert_eq!(
+            can_block(&turned_light, &[hull(&ground)], &turned),
+            [false, false, false, true, true]
+        );
     }
 
     #[test]

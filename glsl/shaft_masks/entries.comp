@@ -268,6 +268,7 @@ void main() {
     Shaft shaft = fetch_shaft(part);
     Surfaces surfaces = fetch_surfaces(part, view.light);
     vec3 some = fetch_some_surface(part);
+    mat3 frame = light_frame(view.light, some);
     uint last = first_triangle + candidates.y - 1u;
     uint chunk = candidates.x;
     uint turn = 0u;
@@ -278,10 +279,11 @@ void main() {
             Triangle t = fetch_triangle(triangle);
             if (meets(shaft, t)) {
                 bool between = is_whole(surfaces, t);
-                uint side = between ? triangle_side(surfaces, t.corners[0], t.plane.xyz) : SIDE_UNSURE;
-                bool hides = !is_below(surfaces, t.corners[0], t.corners[1], t.corners[2])
-                    && !is_beyond_light(surfaces, t.corners[0], t.corners[1], t.corners[2]);
-                if (side != SIDE_UNSURE) {
+                uint side = triangle_side(surfaces, t.corners[0], t.plane.xyz);
+                uint side_of_light = light_side(surfaces, view.light, frame, t.corners[0], t.plane.xyz);
+                bool hides = !hides_nothing(surfaces, shaft, part, side, side_of_light,
+                    t.corners[0], t.corners[1], t.corners[2]);
+                if (between && side != SIDE_UNSURE) {
                     uint at = atomicAdd(counted_count[turn % 3u], 1u);
                     counted[turn % 2u][at] = triangle << 1 | (side == SIDE_BACK ? 1u : 0u);
                 } else if (hides && between) {
@@ -325,7 +327,6 @@ void main() {
     // Whether a triangle is between all surfaces and all of the light: sides of its edges are bilinear in the two ends
     // of a segment, so corners decide.
     uint pairs = 64u * min(cover_count, MOST_COVERS);
-    mat3 frame = light_frame(view.light, some);
     for (uint i = lane; i < pairs; i += gl_WorkGroupSize.x) {
         Triangle t = fetch_triangle(covers[i / 64u]);
         vec3 p = surfaces_corner(surfaces, i & 7u);

@@ -1,8 +1,9 @@
 #version 460
-// Walks the hierarchy with the shaft of each tile, or part of one. A tile whose shaft meets no triangle is lit and settled
-// here. The others get a list of candidates: the triangles whose boxes the shaft meets, but for those
-// that lie in it together with their neighbours and show one side to all of the tile, whose edges all
-// cancel.
+// Walks the hierarchy with the shaft of each tile, or part of one. A tile whose shaft meets no triangle is lit, one
+// whose surfaces are all turned away from the light is dark: both are settled here. The others get a list of
+// candidates: the triangles whose boxes the shaft meets, but for those that lie in it together with their neighbours
+// and show one side to all of the tile, whose edges all cancel. Of a short list each triangle is looked at here: where
+// none of them hides anything the tile is lit, too.
 
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
@@ -36,13 +37,14 @@ layout(set = 0, binding = 10, rgba32ui) uniform writeonly uimage2D lists;
 layout(set = 0, binding = 11, r32f) uniform writeonly image2D visibility;
 layout(set = 0, binding = 12) uniform sampler2D view_depth;
 layout(set = 0, binding = 13, r32ui) uniform writeonly uimage2D estimates;
+layout(set = 0, binding = 14) uniform sampler2D triangles;
 
 // A software driver may end loops after 65,535 turns of all lanes of a vector together: a walk ends
 // itself before, and its tile is walked anew in pieces.
 const uint MOST_STEPS = 49152u;
 
 vec4 fetch_triangle_texel(uint texel) {
-    return vec4(0.0); // none is needed here
+    return texelFetch(triangles, triangle_texel_place(texel), 0);
 }
 
 vec4 fetch_node_texel(ivec2 place) {
@@ -60,6 +62,27 @@ bool cancels(Surfaces surfaces, vec3 low, vec4 high, vec4 cone) {
     vec3 half_size = 0.5 * high.xyz - 0.5 * low + high.w;
     return cone.w < 1.0 && is_between(surfaces, middle, length(half_size) + surfaces.margin_m)
         && box_side(surfaces, middle, half_size, cone.xyz, cone.w) != SIDE_UNSURE;
+}
+
+// Longest list whose triangles are looked at one by one. Invocations of a vector wait for the one with most of them.
+const uint SHORT_LIST = 8u;
+
+// Whether any triangle of a short list may hide some of the light.
+bool any_hides(Surfaces surfaces, Shaft shaft, uvec2 part, uint short_list[SHORT_LIST], uint count) {
+    mat3 frame = light_frame(view.light, fetch_some_surface(part));
+    bool any = false;
+    for (uint i = 0u; i < count && !any; ++i) {
+        uint triangle = short_list[i];
+        vec3 a = fetch_triangle_texel(4u * triangle).xyz;
+        vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
+        vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
+        vec3 normal = fetch_triangle_texel(4u * triangle + 3u).xyz;
+        uint side = triangle_side(surfaces, a, normal);
+        uint side_of_light = light_side(surfaces, view.light, frame, a, normal);
+        any = shaft_meets_triangle(shaft, a, b, c)
+            && !hides_nothing(surfaces, shaft, part, side, side_of_light, a, b, c);
+    }
+    return any;
 }
 
 void main() {
@@ -80,8 +103,10 @@ void main() {
     bool complete = true;
     uint chunk = 0u;
     uint slot = CHUNK;
-    bool any = false;
-    uint node = 0u;
+    bool any_inside = false;
+    uint short_list[SHORT_LIST];
+    bool dark = shaft.low.w < 0.0;
+    uint node = dark ? nodes : 0u;
     uint steps = 0u;
     while (node < nodes) {
         steps += 1u;
@@ -90,9 +115,8 @@ void main() {
         vec4 cone = fetch_node_cone(node);
         bool leaf = low.w >= 0.0;
         uint side = shaft_side_of_box(shaft, low.xyz, high.xyz);
-        any = any || (leaf && side != BOX_OUTSIDE);
         bool inside = side == BOX_INSIDE && cancels(surfaces, low.xyz, high, cone);
-        any = any || inside;
+        any_inside = any_inside || inside;
         bool enter = side != BOX_OUTSIDE && !inside;
         uint next = leaf || enter ? node + 1u : uint(-low.w);
         if (leaf && enter) {
@@ -111,6 +135,9 @@ void main() {
             }
             if (complete) {
                 imageStore(pool, chunk_entry_place(chunk, slot), uvec4(uint(low.w)));
+                if (count < SHORT_LIST) {
+                    short_list[count] = uint(low.w);
+                }
                 slot += 1u;
                 count += 1u;
             }
@@ -123,15 +150,16 @@ void main() {
     }
 
     vec2 depths = fetch_part_depths(part);
-    bool lit = !any && complete && shaft.low.w > 0.0;
-    if (lit) {
-        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(LEVEL_LIT));
+    bool lit = complete && !any_inside && count <= SHORT_LIST && shaft.low.w > 0.0;
+    lit = lit && !any_hides(surfaces, shaft, part, short_list, count);
+    if (lit || dark) {
+        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(dark ? LEVEL_DARK : LEVEL_LIT));
         for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
             // Stores beyond the picture's border are dropped.
             uvec2 pixel = tile_of_part(part, tiles) * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);
             float depth = texelFetch(view_depth, ivec2(min(pixel, size - 1u)), 0).x;
             if (is_in_part(depths, depth)) {
-                imageStore(visibility, ivec2(pixel), vec4(1.0));
+                imageStore(visibility, ivec2(pixel), vec4(dark && depth > 0.0 ? 0.0 : 1.0));
             }
         }
     } else {

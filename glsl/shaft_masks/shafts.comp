@@ -1,6 +1,9 @@
 #version 460
-// The shaft of each listed tile, or of the parts of a tile that spans a gap in depth, which it lists: the hull of two boxes, around its surfaces and around the light, along
-// the axes of the light. One invocation a tile: all do the same work, without barriers.
+#extension GL_EXT_control_flow_attributes : require
+// The shaft of each listed tile, or of the parts of a tile that spans a gap in depth, which it lists: the hull of two
+// boxes, around its surfaces and around the light, along the axes of the light. Surfaces that are turned away from
+// the light see none of it whatever is listed, and are left out. One invocation a tile: all do the same work, without
+// barriers.
 
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
@@ -51,6 +54,27 @@ const float LEAST_GAP = 0.3;
 // Normals whose coordinates differ by less are one.
 const float SAME_NORMAL = 1.0e-6;
 
+// The triangles that a tile shows, up to MOST_FACETS of them: their numbers plus one, and a pixel of each.
+struct Facets {
+    uint count;
+    uint ids[MOST_FACETS];
+    uint pixels[MOST_FACETS];
+};
+
+void add_facet(inout Facets facets, uint id, uint pixel) {
+    bool known = false;
+    [[unroll]] for (uint k = 0u; k < MOST_FACETS; ++k) {
+        known = known || facets.ids[k] == id;
+    }
+    facets.count += known ? 0u : 1u;
+    [[unroll]] for (uint k = MOST_FACETS - 1u; k > 0u; --k) {
+        facets.ids[k] = known ? facets.ids[k] : facets.ids[k - 1u];
+        facets.pixels[k] = known ? facets.pixels[k] : facets.pixels[k - 1u];
+    }
+    facets.ids[0] = known ? facets.ids[0] : id;
+    facets.pixels[0] = known ? facets.pixels[0] : pixel;
+}
+
 // The side of the hull of two boxes towards +a in the plane of a and z. light: half its size along a
 // and z; near: least z of the surfaces, reach: their largest a and z. Returns the outward normal along a
 // and z and the offset.
@@ -72,6 +96,21 @@ vec3 hull_side(vec2 light_half, float reach_a, float near_z, float far_z) {
     return vec3(normal, max(light, surfaces));
 }
 
+// The geometric normal of a surface on the side that is seen. id: of its triangle, plus one.
+vec3 fetch_normal(uint id, vec3 ray) {
+    vec3 n = fetch_geometric_normal(max(id, 1u) - 1u);
+    return dot(n, ray) > 0.0 ? -n : n;
+}
+
+// Whether all of the light is below a surface's own plane, which then hides all samples: nothing else matters to it.
+// Masks are made of such pixels all the same; other techniques, which leave tiles whole, may want more of them.
+bool is_turned_away(Light light, vec3 p, vec3 n) {
+    vec3 to_light = light_offset(light, p);
+    float reach = LIGHT_SHAPE == LIGHT_SPHERE ? light.axis_x.w
+        : dot(abs(vec2(dot(n, light.axis_x.xyz), dot(n, light.axis_y.xyz))), light_half_size(light).xy);
+    return MOST_PARTS > 1u && dot(n, to_light) < -reach - SLACK * length(to_light);
+}
+
 // Axes of a box that fits flat surfaces: along the normal of the surface at a pixel, and along the view.
 mat3 surface_frame(uvec2 pixel, vec3 ray) {
     uint id = texelFetch(ids, ivec2(pixel), 0).x;
@@ -83,9 +122,10 @@ mat3 surface_frame(uvec2 pixel, vec3 ray) {
     return mat3(x, cross(z, x), z);
 }
 
-// Surfaces of shaft_masks/sides.glsl. low, high: of the box in its frame, from some surface.
-void store_surfaces(ivec2 place, Light light, vec3 some, mat3 frame, vec3 low, vec3 high, float slack, vec2 depths) {
-    vec3 center = some + frame * (0.5 * low + 0.5 * high);
+// Surfaces of shaft_masks/sides.glsl. low, high: of the box in its frame, from its base. some: one of them.
+void store_surfaces(ivec2 place, Light light, vec3 base, vec3 some, mat3 frame, vec3 low, vec3 high, float slack,
+    vec2 depths) {
+    vec3 center = base + frame * (0.5 * low + 0.5 * high);
     vec3 half_size = 0.5 * high - 0.5 * low;
     float radius = length(half_size);
     vec3 z = LIGHT_SHAPE == LIGHT_SUN ? light.center.xyz : light.direction.xyz;
@@ -133,14 +173,26 @@ void main() {
     Light light = view.light;
     vec3 eye = view.camera.eye.xyz;
 
-    // The gap in the middle of the tile's depths, if there is room for one.
+    // The gap in the middle of the depths of surfaces that are not turned away, if there is room for one.
     ivec2 bounds_place = ivec2(tile.x * TILE_TEXELS, tile.y);
     vec3 depth_bounds = texelFetch(tile_bounds, bounds_place, 0).xyz;
     TileBounds bounds = tile_bounds_of(vec4(depth_bounds, 0.0), vec4(0.0), vec4(0.0));
-    float nearest = bounds.nearest;
-    float farthest = bounds.farthest;
-    float width = nearest * float(TILE_SIZE) * length(view.camera.pixel_right.xyz);
-    uint looks = farthest - nearest > width || !bounds.all_hit ? TILE_SIZE * TILE_SIZE : 0u;
+    float width = bounds.nearest * float(TILE_SIZE) * length(view.camera.pixel_right.xyz);
+    uint looks = bounds.farthest - bounds.nearest > width || !bounds.all_hit ? TILE_SIZE * TILE_SIZE : 0u;
+    float nearest = FAR;
+    float farthest = 0.0;
+    uvec2 seen = uvec2(0u);
+    for (uint i = 0u; i < looks; ++i) {
+        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
+        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        vec3 ray = pixel_ray(view.camera, pixel);
+        bool counts = depth > 0.0
+            && !is_turned_away(light, eye + depth * ray, fetch_normal(texelFetch(ids, ivec2(pixel), 0).x, ray));
+        nearest = counts ? min(nearest, depth) : nearest;
+        farthest = counts ? max(farthest, depth) : farthest;
+        uint bit = counts ? 1u << (i & 31u) : 0u;
+        seen |= i < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
+    }
     float middle = 0.5 * nearest + 0.5 * farthest;
     float before_gap = 0.0;
     float after_gap = FAR;
@@ -148,24 +200,26 @@ void main() {
     uvec2 at_far = tile * TILE_SIZE;
     for (uint i = 0u; i < looks; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
-        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        bool counts = ((i < 32u ? seen.x : seen.y) >> (i & 31u) & 1u) != 0u;
+        float depth = counts ? texelFetch(view_depth, ivec2(pixel), 0).x : -1.0;
         at_near = depth < middle && depth > before_gap ? pixel : at_near;
         before_gap = depth < middle ? max(before_gap, depth) : before_gap;
-        after_gap = depth >= middle ? min(after_gap, depth) : after_gap;
+        after_gap = counts && depth >= middle ? min(after_gap, depth) : after_gap;
         at_far = depth == farthest ? pixel : at_far;
     }
     float gap = after_gap - before_gap;
-    bool split = MOST_PARTS > 1u && before_gap > 0.0 && gap > width && gap > LEAST_GAP * (farthest - nearest);
+    bool both = before_gap > 0.0 && after_gap < FAR;
+    bool split = MOST_PARTS > 1u && both && gap > width && gap > LEAST_GAP * (farthest - nearest);
     bool behind = gl_GlobalInvocationID.y > 0u;
     if (behind && !split) {
         return;
     }
     vec2 depths = !split ? vec2(0.0, FAR) : behind ? vec2(after_gap, FAR) : vec2(0.0, after_gap);
 
-    // A surface, for the frames.
+    // Some pixel, for the frames.
     uvec2 at = split && !behind ? at_near : at_far;
-    vec3 some = eye + texelFetch(view_depth, ivec2(at), 0).x * pixel_ray(view.camera, at);
-    mat3 frame = light_frame(light, some);
+    vec3 base = eye + texelFetch(view_depth, ivec2(at), 0).x * pixel_ray(view.camera, at);
+    mat3 frame = light_frame(light, base);
     mat3 box_frame = surface_frame(at, pixel_ray(view.camera, at));
 
     // Coordinates of a sun's frame are taken from the eye, of other lights from their centre.
@@ -182,9 +236,17 @@ void main() {
     vec3 normal_low = vec3(2.0);
     vec3 normal_high = vec3(-2.0);
     bool above = true;
+    bool any = false;
+    vec3 some = base;
     vec3 normal = vec3(0.0);
     float plane_low = FAR;
     float plane_high = -FAR;
+    Facets facets;
+    facets.count = 0u;
+    [[unroll]] for (uint k = 0u; k < MOST_FACETS; ++k) {
+        facets.ids[k] = 0u;
+        facets.pixels[k] = 0u;
+    }
     for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
         float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
@@ -192,8 +254,17 @@ void main() {
         if (depth > 0.0 && is_in_part(depths, depth)) {
             vec3 ray = pixel_ray(view.camera, pixel);
             vec3 p = eye + depth * ray;
-            vec3 n = fetch_geometric_normal(id - 1u);
-            n = dot(n, ray) > 0.0 ? -n : n;
+            vec3 n = fetch_normal(id, ray);
+            vec3 to_light = light_offset(light, p);
+            above = above && dot(n, to_light) > dot(abs(n), light_reach) + SLACK * length(to_light);
+            if (is_turned_away(light, p, n)) {
+                continue;
+            }
+            some = any ? some : p;
+            any = true;
+            if (MOST_PARTS > 1u) {
+                add_facet(facets, id, i);
+            }
             normal = normal == vec3(0.0) ? n : normal;
             normal_low = min(normal_low, n);
             normal_high = max(normal_high, n);
@@ -204,11 +275,9 @@ void main() {
             vec3 q = (p - origin) * frame;
             low = min(low, q);
             high = max(high, q);
-            vec3 own = (p - some) * box_frame;
+            vec3 own = (p - base) * box_frame;
             own_low = min(own_low, own);
             own_high = max(own_high, own);
-            vec3 to_light = light_offset(light, p);
-            above = above && dot(n, to_light) > dot(abs(n), light_reach) + SLACK * length(to_light);
         }
     }
     vec3 extent = max(max(abs(box_low), abs(box_high)), abs(eye));
@@ -249,10 +318,10 @@ void main() {
         bool turned = dot(box_frame[2], pixel_ray(view.camera, at)) > 0.0;
         vec3 up = turned ? -box_frame[2] : box_frame[2];
         float lowest = turned ? -own_high.z : own_low.z;
-        vec3 to_light = light_offset(light, some);
+        vec3 to_light = light_offset(light, base);
         bool is_above = dot(up, to_light) - dot(abs(up), light_reach)
             > (LIGHT_SHAPE == LIGHT_SUN ? SLACK : lowest + slack);
-        planes[6] = is_above ? vec4(-up, slack - lowest - dot(up, some)) : planes[6];
+        planes[6] = is_above ? vec4(-up, slack - lowest - dot(up, base)) : planes[6];
     }
 
     if (LIGHT_SHAPE == LIGHT_SUN) {
@@ -266,17 +335,26 @@ void main() {
     }
     uvec2 part = uvec2(tile.x, tile.y + (behind ? tiles.y : 0u));
     ivec2 place = ivec2(part.x * SHAFT_TEXELS, part.y);
-    store_surfaces(place + ivec2(SHAFT_PLANES + 2u, 0), light, some, box_frame, own_low - slack,
+    store_surfaces(place + ivec2(SHAFT_PLANES + 2u, 0), light, base, some, box_frame, own_low - slack,
         own_high + slack, slack, depths);
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 8u, 0), vec4(normal_low, some.y));
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 9u, 0), vec4(normal_high, some.z));
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         imageStore(shafts, place + ivec2(i, 0), planes[i]);
     }
-    vec4 first = vec4(box_low - slack, above ? 1.0 : 0.0);
-    vec4 last = vec4(box_high + slack, 0.0);
+    vec4 first = vec4(box_low - slack, !any ? -1.0 : above ? 1.0 : 0.0);
+    vec4 last = vec4(box_high + slack, MOST_PARTS > 1u && facets.count <= MOST_FACETS ? 1.0 : 0.0);
     imageStore(shafts, place + ivec2(SHAFT_PLANES, 0), first);
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 1u, 0), last);
+    [[unroll]] for (uint k = 0u; k < MOST_FACETS; ++k) {
+        uint at_facet = facets.pixels[k];
+        uvec2 pixel = min(tile * TILE_SIZE + uvec2(at_facet % TILE_SIZE, at_facet / TILE_SIZE), size - 1u);
+        vec3 ray = pixel_ray(view.camera, pixel);
+        vec3 p = eye + texelFetch(view_depth, ivec2(pixel), 0).x * ray;
+        vec3 n = fetch_normal(facets.ids[k], ray);
+        vec4 facet = facets.ids[k] > 0u ? vec4(n, dot(n, p) + rounding) : vec4(vec3(0.0), FAR);
+        imageStore(shafts, place + ivec2(FIRST_FACET + k, 0), facet);
+    }
     uint slot = atomicAdd(parts.count, 1u);
     imageStore(part_list, tile_entry_place(slot, tiles), uvec4(part.y * tiles.x + part.x));
 }

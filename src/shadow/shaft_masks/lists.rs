@@ -94,14 +94,14 @@ impl Making {
         let format = vk::Format::R32G32B32A32_UINT;
         let desc = ImageDesc::new(format, across * LIST_TEXELS, down * PARTS);
         let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
-        let hierarchy = inputs.ids.hierarchy;
+        let (hierarchy, triangles) = (inputs.ids.hierarchy, inputs.ids.triangles);
         let view_depth = inputs.gbuffer.view_depth;
         let (view_params, part) = inputs.view_params;
         let shape = shape_number(&inputs.light.shape);
         let mut pass = graph.pass(format!("{NAME}.lists {name}"), PassKind::Compute);
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
-        for image in [hierarchy, shafts, view_depth] {
+        for image in [hierarchy, triangles, shafts, view_depth] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         parts.read(&mut pass);
@@ -128,6 +128,7 @@ impl Making {
                 Bind::storage_image(11, visibility),
                 Bind::sampled(12, view_depth, nearest),
                 Bind::storage_image(13, estimates),
+                Bind::sampled(14, triangles, nearest),
             ];
             let shader = &spirv::SHAFT_MASKS_LISTS_COMP;
             let pipeline = ComputePipelineDesc {

@@ -15,7 +15,7 @@ use support::plates::{SIZE, camera, floor, plate, scene};
 use support::rig::with_renderer;
 
 /// Techniques that have nothing to do where nothing blocks.
-const TECHNIQUES: [&str; 8] = [
+const TECHNIQUES: [&str; 9] = [
     "hard",
     "pcf",
     "pcss",
@@ -24,6 +24,7 @@ const TECHNIQUES: [&str; 8] = [
     "ssoc",
     "dbuffer",
     "oess",
+    "shaft-masks",
 ];
 const DISK: LightShape = LightShape::Disk { radius: 0.5 };
 

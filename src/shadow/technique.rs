@@ -423,7 +423,8 @@ impl Technique {
             Self::Mdi(_) | Self::Oess(_) => (!light.is_uneven()).then_some(light.shape),
             Self::Ssoc(options) => (!options.falloff).then_some(light.shape),
             Self::Dbuffer(options) => options.unblocked_shape(light),
-            Self::ShaftMasks(_) => None,
+            // What a bound that is asked for comes to, its counters say.
+            Self::ShaftMasks(options) => options.bound.is_none().then_some(light.shape),
             // The technique that is chosen says.
             Self::Auto(_) => None,
         }
@@ -449,7 +450,22 @@ impl Technique {
         if let Some(shape) = self.unblocked_shape(&inputs.light)
             && let Some(reason) = why_unblocked(inputs)
         {
-            return add_unblocked(graph, inputs, self.name(), shape, reason);
+            let mask = add_unblocked(graph, inputs, self.name(), shape, reason);
+            // Where somebody reads a bound, that of the masks, which are off by more than the horizons.
+            let error_bound = match self {
+                Self::ShaftMasks(options) => {
+                    let options = ShaftOptions {
+                        target_error: None,
+                        ..options
+                    };
+                    shaft_masks::add_passes(graph, inputs, options).error_bound
+                }
+                _ => None,
+            };
+            return ShadowMask {
+                error_bound,
+                ..mask
+            };
         }
         match self {
             Self::Hard => hard::add_passes(graph, inputs),

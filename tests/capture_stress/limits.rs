@@ -194,10 +194,14 @@ pub fn leak(technique: Technique) -> f32 {
 /// `occlusion-textures` in `shut-in` scaled (100 of 4096, by up to 0.01), and `oess` in `cage`, where a line lies
 /// within a mesh with dozens of holes and edges beside the line come and go (mean changes of up to 0.06).
 ///
-/// What `auto` chooses is among them.
+/// What `auto` chooses is among them. With `ANTUMBRA_TEST_TECHNIQUE` only the one that it names.
 pub fn techniques() -> impl Iterator<Item = Technique> {
+    let one = std::env::var("ANTUMBRA_TEST_TECHNIQUE").ok();
     let all = Technique::ALL.iter().copied();
-    all.filter(|technique| !matches!(technique, Technique::Auto(_)))
+    all.filter(move |technique| match &one {
+        Some(name) => technique.name() == name,
+        None => !matches!(technique, Technique::Auto(_)),
+    })
 }
 
 /// Whether frames of a technique take milliseconds; those of the others take up to a second on some drivers.

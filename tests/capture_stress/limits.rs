@@ -75,20 +75,18 @@ pub fn limits(technique: Technique) -> Limits {
             jump: 0.25,
             flips: MAY_FLIP,
         },
-        // Edges lie where triangles end, whatever the map, but which triangles a receiver looks at is a
-        // matter of texels: of blockers smaller than some texels, as where a box stands on a wide floor,
-        // another part is found once the map is fitted anew (0.12 measured). In the cage nearly all
-        // pixels are partly lit by way of dozens of holes; two of 3058 find another edge by rounding, 0.012 off.
+        // No map but that of the line's centre decides anything, and edges are where triangles have them, whatever
+        // the guise: no pixel changes by a thousandth. Edges that share a 32nd of the line are the step.
         "oess" => Limits {
-            step: 0.05,
+            step: 1.0 / 32.0,
             fine: 0.005,
             own_walls: 0.0,
-            turned: 0.2,
-            turned_mean: 0.002,
+            turned: 0.01,
+            turned_mean: 0.001,
             brighter: 0.0,
             jumps: 0.005,
             jump: 0.25,
-            flips: 0.001,
+            flips: MAY_FLIP,
         },
         // Measured at these pictures' 512 texels: boxes that turn with the scene fit nearly the same
         // views, and the rest is where texels and slices fall on edges; most under a light that its

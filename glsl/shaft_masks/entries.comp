@@ -281,7 +281,7 @@ void main() {
                 bool between = is_whole(surfaces, t);
                 uint side = triangle_side(surfaces, t.corners[0], t.plane.xyz);
                 uint side_of_light = light_side(surfaces, view.light, frame, t.corners[0], t.plane.xyz);
-                bool hides = !hides_nothing(surfaces, shaft, part, side, side_of_light,
+                bool hides = !hides_nothing(surfaces, side, side_of_light,
                     t.corners[0], t.corners[1], t.corners[2]);
                 if (between && side != SIDE_UNSURE) {
                     uint at = atomicAdd(counted_count[turn % 3u], 1u);

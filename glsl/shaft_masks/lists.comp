@@ -68,8 +68,8 @@ bool cancels(Surfaces surfaces, vec3 low, vec4 high, vec4 cone) {
 const uint SHORT_LIST = 8u;
 
 // Whether any triangle of a short list may hide some of the light.
-bool any_hides(Surfaces surfaces, Shaft shaft, uvec2 part, uint short_list[SHORT_LIST], uint count) {
-    mat3 frame = light_frame(view.light, fetch_some_surface(part));
+bool any_hides(Surfaces surfaces, Shaft shaft, vec3 some, uint short_list[SHORT_LIST], uint count) {
+    mat3 frame = light_frame(view.light, some);
     bool any = false;
     for (uint i = 0u; i < count && !any; ++i) {
         uint triangle = short_list[i];
@@ -80,7 +80,7 @@ bool any_hides(Surfaces surfaces, Shaft shaft, uvec2 part, uint short_list[SHORT
         uint side = triangle_side(surfaces, a, normal);
         uint side_of_light = light_side(surfaces, view.light, frame, a, normal);
         any = shaft_meets_triangle(shaft, a, b, c)
-            && !hides_nothing(surfaces, shaft, part, side, side_of_light, a, b, c);
+            && !hides_nothing(surfaces, side, side_of_light, a, b, c);
     }
     return any;
 }
@@ -151,7 +151,7 @@ void main() {
 
     vec2 depths = fetch_part_depths(part);
     bool lit = complete && !any_inside && count <= SHORT_LIST && shaft.low.w > 0.0;
-    lit = lit && !any_hides(surfaces, shaft, part, short_list, count);
+    lit = lit && !any_hides(surfaces, shaft, fetch_some_surface(part), short_list, count);
     if (lit || dark) {
         imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(dark ? LEVEL_DARK : LEVEL_LIT));
         for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {

@@ -11,11 +11,8 @@
 
 // Four sides, two ends, and the surfaces' own plane where they have one.
 const uint SHAFT_PLANES = 7u;
-// Planes of a tile's surfaces that are kept one by one.
-const uint MOST_FACETS = 8u;
-// Texels of a tile's shaft, side by side: planes, box, box of its surfaces, space between, normals, facets.
-const uint FIRST_FACET = SHAFT_PLANES + 10u;
-const uint SHAFT_TEXELS = FIRST_FACET + MOST_FACETS;
+// Texels of a tile's shaft, side by side: planes, box, box of its surfaces, space between, normals.
+const uint SHAFT_TEXELS = SHAFT_PLANES + 10u;
 
 // Rounding of positions, as a part of the largest coordinate: a few units of the last place. What is
 // nearer to a surface than that does not block its light.
@@ -24,7 +21,7 @@ const float POSITION_ROUNDING = 1.0 / 2097152.0;
 struct Shaft {
     vec4 planes[SHAFT_PLANES];
     vec4 low;  // xyz: of the box; w: 1 where all of the light is above all surfaces' planes, -1 where none of it is
-    vec4 high; // xyz: of the box; w: 1 where all surfaces lie in the facets
+    vec4 high; // xyz: of the box
 };
 
 vec4 fetch_shaft_texel(ivec2 place); // defined by the entry file

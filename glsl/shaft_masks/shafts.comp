@@ -1,5 +1,4 @@
 #version 460
-#extension GL_EXT_control_flow_attributes : require
 // The shaft of each listed tile, or of the parts of a tile that spans a gap in depth, which it lists: the hull of two
 // boxes, around its surfaces and around the light, along the axes of the light. Surfaces that are turned away from
 // the light see none of it whatever is listed, and are left out. One invocation a tile: all do the same work, without
@@ -53,27 +52,6 @@ const float SLACK = 1.0e-6;
 const float LEAST_GAP = 0.3;
 // Normals whose coordinates differ by less are one.
 const float SAME_NORMAL = 1.0e-6;
-
-// The triangles that a tile shows, up to MOST_FACETS of them: their numbers plus one, and a pixel of each.
-struct Facets {
-    uint count;
-    uint ids[MOST_FACETS];
-    uint pixels[MOST_FACETS];
-};
-
-void add_facet(inout Facets facets, uint id, uint pixel) {
-    bool known = false;
-    [[unroll]] for (uint k = 0u; k < MOST_FACETS; ++k) {
-        known = known || facets.ids[k] == id;
-    }
-    facets.count += known ? 0u : 1u;
-    [[unroll]] for (uint k = MOST_FACETS - 1u; k > 0u; --k) {
-        facets.ids[k] = known ? facets.ids[k] : facets.ids[k - 1u];
-        facets.pixels[k] = known ? facets.pixels[k] : facets.pixels[k - 1u];
-    }
-    facets.ids[0] = known ? facets.ids[0] : id;
-    facets.pixels[0] = known ? facets.pixels[0] : pixel;
-}
 
 // The side of the hull of two boxes towards +a in the plane of a and z. light: half its size along a
 // and z; near: least z of the surfaces, reach: their largest a and z. Returns the outward normal along a
@@ -175,14 +153,18 @@ void main() {
 
     // The gap in the middle of the depths of surfaces that are not turned away, if there is room for one.
     ivec2 bounds_place = ivec2(tile.x * TILE_TEXELS, tile.y);
-    vec3 depth_bounds = texelFetch(tile_bounds, bounds_place, 0).xyz;
-    TileBounds bounds = tile_bounds_of(vec4(depth_bounds, 0.0), vec4(0.0), vec4(0.0));
+    TileBounds bounds = tile_bounds_of(texelFetch(tile_bounds, bounds_place, 0),
+        texelFetch(tile_bounds, bounds_place + ivec2(1, 0), 0), texelFetch(tile_bounds, bounds_place + ivec2(2, 0), 0));
     float width = bounds.nearest * float(TILE_SIZE) * length(view.camera.pixel_right.xyz);
     uint looks = bounds.farthest - bounds.nearest > width || !bounds.all_hit ? TILE_SIZE * TILE_SIZE : 0u;
-    float nearest = FAR;
-    float farthest = 0.0;
-    uvec2 seen = uvec2(0u);
-    for (uint i = 0u; i < looks; ++i) {
+    // Normals are looked at where some of them may be turned away.
+    vec3 near_light = light_offset(light, eye + bounds.farthest * pixel_ray(view.camera, tile * TILE_SIZE));
+    bool turns = MOST_PARTS > 1u && -most_along(bounds.normal_low, bounds.normal_high, -near_light) < 0.0;
+    uint normal_looks = turns ? looks : 0u;
+    float nearest = turns ? FAR : bounds.nearest;
+    float farthest = turns ? 0.0 : bounds.farthest;
+    uvec2 seen = uvec2(turns ? 0u : ~0u);
+    for (uint i = 0u; i < normal_looks; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
         float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
         vec3 ray = pixel_ray(view.camera, pixel);
@@ -201,7 +183,9 @@ void main() {
     for (uint i = 0u; i < looks; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
         bool counts = ((i < 32u ? seen.x : seen.y) >> (i & 31u) & 1u) != 0u;
-        float depth = counts ? texelFetch(view_depth, ivec2(pixel), 0).x : -1.0;
+        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        counts = counts && depth > 0.0;
+        depth = counts ? depth : -1.0;
         at_near = depth < middle && depth > before_gap ? pixel : at_near;
         before_gap = depth < middle ? max(before_gap, depth) : before_gap;
         after_gap = counts && depth >= middle ? min(after_gap, depth) : after_gap;
@@ -241,12 +225,6 @@ void main() {
     vec3 normal = vec3(0.0);
     float plane_low = FAR;
     float plane_high = -FAR;
-    Facets facets;
-    facets.count = 0u;
-    [[unroll]] for (uint k = 0u; k < MOST_FACETS; ++k) {
-        facets.ids[k] = 0u;
-        facets.pixels[k] = 0u;
-    }
     for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
         float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
@@ -262,9 +240,6 @@ void main() {
             }
             some = any ? some : p;
             any = true;
-            if (MOST_PARTS > 1u) {
-                add_facet(facets, id, i);
-            }
             normal = normal == vec3(0.0) ? n : normal;
             normal_low = min(normal_low, n);
             normal_high = max(normal_high, n);
@@ -343,18 +318,9 @@ void main() {
         imageStore(shafts, place + ivec2(i, 0), planes[i]);
     }
     vec4 first = vec4(box_low - slack, !any ? -1.0 : above ? 1.0 : 0.0);
-    vec4 last = vec4(box_high + slack, MOST_PARTS > 1u && facets.count <= MOST_FACETS ? 1.0 : 0.0);
+    vec4 last = vec4(box_high + slack, 0.0);
     imageStore(shafts, place + ivec2(SHAFT_PLANES, 0), first);
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 1u, 0), last);
-    [[unroll]] for (uint k = 0u; k < MOST_FACETS; ++k) {
-        uint at_facet = facets.pixels[k];
-        uvec2 pixel = min(tile * TILE_SIZE + uvec2(at_facet % TILE_SIZE, at_facet / TILE_SIZE), size - 1u);
-        vec3 ray = pixel_ray(view.camera, pixel);
-        vec3 p = eye + texelFetch(view_depth, ivec2(pixel), 0).x * ray;
-        vec3 n = fetch_normal(facets.ids[k], ray);
-        vec4 facet = facets.ids[k] > 0u ? vec4(n, dot(n, p) + rounding) : vec4(vec3(0.0), FAR);
-        imageStore(shafts, place + ivec2(FIRST_FACET + k, 0), facet);
-    }
     uint slot = atomicAdd(parts.count, 1u);
     imageStore(part_list, tile_entry_place(slot, tiles), uvec4(part.y * tiles.x + part.x));
 }

@@ -78,18 +78,6 @@ bool is_below(Surfaces surfaces, vec3 a, vec3 b, vec3 c) {
     return most <= 0.0;
 }
 
-// Whether a triangle is below every plane that the tile's surfaces lie in. shaft: theirs.
-bool is_below_facets(Shaft shaft, uvec2 part, vec3 a, vec3 b, vec3 c) {
-    bool below = shaft.high.w > 0.0;
-    ivec2 place = ivec2(part.x * SHAFT_TEXELS + FIRST_FACET, part.y);
-    for (uint i = 0u; i < MOST_FACETS; ++i) {
-        vec4 facet = fetch_shaft_texel(place + ivec2(i, 0));
-        float most = max(dot(facet.xyz, a), max(dot(facet.xyz, b), dot(facet.xyz, c)));
-        below = below && most <= facet.w;
-    }
-    return below;
-}
-
 // Sides of a triangle.
 const uint SIDE_UNSURE = 0u;
 const uint SIDE_FRONT = 1u;
@@ -119,9 +107,9 @@ uint light_side(Surfaces surfaces, Light light, mat3 frame, vec3 a, vec3 normal)
 
 // Whether a triangle hides nothing from any surface: all of them and all of the light are on one side of it, or it is
 // below them, or beyond the light.
-bool hides_nothing(Surfaces surfaces, Shaft shaft, uvec2 part, uint side, uint side_of_light, vec3 a, vec3 b, vec3 c) {
+bool hides_nothing(Surfaces surfaces, uint side, uint side_of_light, vec3 a, vec3 b, vec3 c) {
     return (side != SIDE_UNSURE && side == side_of_light) || is_below(surfaces, a, b, c)
-        || is_below_facets(shaft, part, a, b, c) || is_beyond_light(surfaces, a, b, c);
+        || is_beyond_light(surfaces, a, b, c);
 }
 
 // The same for all triangles of a box with normals in a cone: its axis, the sine of half its angle. With twice the

@@ -57,7 +57,7 @@ const MOST_ROWS: usize = 32;
 const BLOCK: u32 = 8;
 
 /// `SHAFT_TEXELS` in `shaft_masks/shaft.glsl`.
-const SHAFT_TEXELS: u32 = 25;
+const SHAFT_TEXELS: u32 = 17;
 
 /// `LIST_TEXELS` in `shaft_masks/lists.glsl`.
 const LIST_TEXELS: u32 = 3;

@@ -105,6 +105,11 @@ fn a_small_benchmark_has_results_and_a_page() -> Result {
     assert!(rays["frame_ms"].is_null() && rays["driver"].is_null());
     assert!(rays["counters"]["rays"].as_u64() > Some(0));
 
+    let matrix = fs::read_to_string(folder.join("out/matrix.md"))?;
+    assert!(
+        matrix.starts_with("| | ") && !matrix.contains("unexplained"),
+        "{matrix}"
+    );
     let page = fs::read_to_string(folder.join("out/report.html"))?;
     for label in labels {
         let mark = format!("data-technique=\"{label}\"");

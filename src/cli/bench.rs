@@ -101,7 +101,7 @@ pub(super) struct BenchArgs {
     #[arg(long, value_name = "NAME|INDEX")]
     device: Option<String>,
 
-    /// Folder for results.json, report.html, plot.svg and images; made if it is not there
+    /// Folder for results.json, report.html, plot.svg, matrix.md and images; made if it is not there
     #[arg(long, value_name = "DIR", required_unless_present = "worker")]
     pub(super) out: Option<PathBuf>,
 
@@ -220,6 +220,8 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CliError> {
     page.write(report::page(session.results(), &shared).as_bytes())?;
     let plot = Output::File(out.join("plot.svg"));
     plot.write(report::plot(session.results()).as_bytes())?;
+    let matrix = Output::File(out.join("matrix.md"));
+    matrix.write(report::matrix(session.results()).as_bytes())?;
     write_table(args, [session.results()])?;
     print_text(&summary(session.results(), &session.file(), &page))?;
     judge([session.results()], session.file())

@@ -96,6 +96,8 @@ pub(super) fn run(args: &MergeArgs) -> Result<(), CliError> {
         let value = serde_json::to_value(&gathered)?;
         let plot = Output::File(out.join("plot.svg"));
         plot.write(bench::report::plot(&gathered).as_bytes())?;
+        let matrix = Output::File(out.join("matrix.md"));
+        matrix.write(bench::report::matrix(&gathered).as_bytes())?;
         (value, bench::report::page(&gathered, &out), what)
     };
     if args.no_timings {

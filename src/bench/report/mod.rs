@@ -50,6 +50,11 @@ pub fn plot(results: &Results) -> String {
     summary::plot_alone(results, Families(&families(results)))
 }
 
+/// What has become of each technique on each scene and light, as a table in Markdown.
+pub fn matrix(results: &Results) -> String {
+    outcomes::markdown(results)
+}
+
 /// Techniques and rivals by name, in order.
 fn families(results: &Results) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();

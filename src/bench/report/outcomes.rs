@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::analysis::Metric;
 use super::format::{error, escape};
+use super::scene_name;
 use super::summary::cell;
 use crate::bench::results::{Entry, FailureKind, ReferenceEntry, Results};
 
@@ -83,8 +84,61 @@ impl<'r> Outcome<'r> {
     }
 }
 
-/// Rows below the matrix: how many cells of each technique have become what.
-pub(super) fn counts(page: &mut String, results: &Results) {
+/// The matrix in Markdown: a row for each scene and light, a column for each technique, and below it why cells
+/// have no error. What is farther than [`RIGHT`] from the truth is in italics.
+pub(super) fn markdown(results: &Results) -> String {
+    let labels = &results.settings.techniques;
+    let mut page = format!(
+        "| | {} |\n|---|{}\n",
+        labels.join(" | "),
+        "--:|".repeat(labels.len())
+    );
+    let mut reasons: Vec<String> = Vec::new();
+    for reference in &results.references {
+        let _ = write!(page, "| {}", scene_name(&reference.scene));
+        let lights = results.references.iter();
+        if lights
+            .filter(|other| other.scene == reference.scene)
+            .count()
+            > 1
+        {
+            let _ = write!(page, ", {}", reference.light);
+        }
+        page.push_str(" |");
+        let entries = results.group(reference);
+        for label in labels {
+            let entry = entries.iter().find(|entry| entry.label == *label);
+            let outcome = Outcome::of(reference, entry.copied());
+            let cell = match outcome {
+                Outcome::Right(rmse) => error(rmse),
+                Outcome::Degraded(rmse) => format!("*{}*", error(rmse)),
+                Outcome::Refused(reason) | Outcome::Failed(reason) | Outcome::Crashed(reason) => {
+                    let known = reasons.iter().position(|other| other == reason);
+                    let number = known.unwrap_or_else(|| {
+                        reasons.push(reason.to_string());
+                        reasons.len() - 1
+                    });
+                    format!("{} ({})", outcome.word(), number + 1)
+                }
+                Outcome::Unexplained => outcome.word().to_string(),
+            };
+            let _ = write!(page, " {cell} |");
+        }
+        page.push('\n');
+    }
+    for (word, counts) in counted(results) {
+        let cells = counts.iter().map(|count| format!(" {count} |"));
+        let _ = writeln!(page, "| **{word}** |{}", cells.collect::<String>());
+    }
+    for (at, reason) in reasons.iter().enumerate() {
+        let separator = if at == 0 { "\n" } else { "" };
+        let _ = writeln!(page, "{separator}{}. {reason}", at + 1);
+    }
+    page
+}
+
+/// How many cells of each technique have become what, without what none has become.
+fn counted(results: &Results) -> Vec<(&'static str, Vec<usize>)> {
     let columns = results.settings.techniques.iter().map(|label| {
         let outcomes = results.references.iter().map(|reference| {
             let entries = results.group(reference);
@@ -94,7 +148,6 @@ pub(super) fn counts(page: &mut String, results: &Results) {
         outcomes.collect::<Vec<_>>()
     });
     let columns: Vec<Vec<&str>> = columns.collect();
-    page.push_str("<tfoot>\n");
     let words = [
         "right",
         "degraded",
@@ -103,14 +156,21 @@ pub(super) fn counts(page: &mut String, results: &Results) {
         "crashed",
         "unexplained",
     ];
-    for word in words {
+    let rows = words.into_iter().map(|word| {
         let count = |column: &Vec<&str>| column.iter().filter(|other| **other == word).count();
-        if columns.iter().all(|column| count(column) == 0) {
-            continue;
-        }
+        (word, columns.iter().map(count).collect::<Vec<_>>())
+    });
+    rows.filter(|(_, counts)| counts.iter().any(|count| *count > 0))
+        .collect()
+}
+
+/// Rows below the matrix: how many cells of each technique have become what.
+pub(super) fn counts(page: &mut String, results: &Results) {
+    page.push_str("<tfoot>\n");
+    for (word, counts) in counted(results) {
         let _ = write!(page, "<tr><th scope=\"row\">{word}</th>");
-        for column in &columns {
-            page.push_str(&cell(Some(count(column).to_string())));
+        for count in counts {
+            page.push_str(&cell(Some(count.to_string())));
         }
         page.push_str("</tr>\n");
     }
@@ -144,6 +204,19 @@ mod tests {
         assert!(
             page.contains(">crashed</th>") && !page.contains("unexplained"),
             "{page}"
+        );
+        let text = markdown(&results);
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(
+            lines[0].starts_with("| | ") && lines[1].starts_with("|---|--:|"),
+            "{text}"
+        );
+        assert!(lines[2].contains("| *0.250* | crashed (1) |"), "{text}");
+        assert!(text.contains("| **degraded** | 1 | 0 |"), "{text}");
+        assert!(
+            lines
+                .last()
+                .is_some_and(|line| line.starts_with("1. ") && line.contains("signal"))
         );
         for (rmse, word) in [(0.02, "right"), (f64::NAN, "failed")] {
             if let Some(error) = &mut results.images[0].error {

@@ -306,6 +306,16 @@ fn passes_that_nobody_reads_are_left_out() {
         text.contains("culled") && text.contains("nobody reads"),
         "{text}"
     );
+    // The floor lies below all that is in view.
+    assert_reason(&plan, "casters 0:lamp", "1 of 2 draws");
+    // A lamp in the middle of the picture's upper part: nothing is above or behind it.
+    let mut lamp = blocked.clone();
+    lamp.lights[0].light.shape = LightShape::Sphere { radius: 0.1 };
+    lamp.lights[0].light.center = Vec3::new(0.0, 0.5, 0.0);
+    for technique in ["hard", "pcss"] {
+        let plan = plan_frame(&lamp, &request(technique)).unwrap();
+        assert_reason(&plan, &format!("{technique}.views 0:lamp"), "1 of 6 views");
+    }
     let plan = plan_frame(&floor_under(DISK), &request("ssoc")).unwrap();
     let json = plan.to_json().to_string();
     assert!(

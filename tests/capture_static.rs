@@ -3,7 +3,7 @@
 
 mod support;
 
-use antumbra::capture::{FrameRenderer, FrameRequest};
+use antumbra::capture::{CapturedFrame, FrameRenderer, FrameRequest};
 use antumbra::light::LightShape;
 use support::plates::{SIZE, camera, floor, plate, scene};
 
@@ -34,6 +34,12 @@ fn what_stays_is_not_made_again() {
         (0, 1)
     );
     assert!(second.counters["transient_bytes"] < first.counters["transient_bytes"]);
+    let says = |frame: &CapturedFrame, name: &str, reason: &str| {
+        let mut culled = frame.plan.culled.iter();
+        culled.any(|pass| pass.name == name && pass.reason.contains(reason))
+    };
+    assert!(says(&second, "pcss 0:lamp", "nothing has moved"));
+    assert!(!says(&first, "pcss 0:lamp", ""));
 
     // A frame in between does not matter.
     renderer.render(&request).unwrap();
@@ -124,6 +130,10 @@ fn silhouettes_stay_while_the_camera_moves() {
     request.camera.position.x += 0.1;
     let moved = renderer.render_static(&request).unwrap();
     assert_eq!(searches(&moved.report.passes), 0);
+    let mut culled = moved.plan.culled.iter();
+    assert!(culled.any(|pass| {
+        pass.name == "ssoc.silhouettes 0:lamp" && pass.reason.contains("casters have moved")
+    }));
     let kept = ["masks_kept", "silhouettes_kept", "edges_found"].map(|name| moved.counters[name]);
     assert_eq!(kept, [0, 1, 1]);
     assert!(moved.lights[0].visibility == renderer.render(&request).unwrap().lights[0].visibility);

@@ -224,6 +224,10 @@ pub(super) fn declare<'f>(
     let (camera, size) = (&request.camera, request.size);
     match shadows {
         Shadows::Kept(kept) => {
+            for (named, choice) in lights.iter().zip(kept.choices()) {
+                let name = format!("{} {}", choice.technique.name(), named.name);
+                graph.skip(name, "nothing has moved since its mask was made");
+            }
             let masks = kept.import(graph);
             let frame = add_frame_with_masks(graph, buffers, camera, size, lights, masks);
             Ok(Frame {

@@ -122,6 +122,7 @@ fn visibilities<'f>(
             // A light's maps and lists lie where those of the light before were.
             graph.begin_part();
         }
+        note_casters(graph, &light.name, &survey.casters[at]);
         let first = graph.pass_count();
         masks.push(choices[at].technique.add_passes(
             graph,
@@ -147,6 +148,17 @@ fn visibilities<'f>(
         choices: choices.to_vec(),
         params,
         parts,
+    }
+}
+
+/// Notes which of the scene's draws are left out of what a light's technique draws; where all are, the technique
+/// says so.
+fn note_casters(graph: &mut Graph<'_>, light: &str, casters: &[bool]) {
+    let idle = casters.iter().filter(|can| !**can).count();
+    if (1..casters.len()).contains(&idle) {
+        let all = casters.len();
+        let reason = format!("{idle} of {all} draws cannot shadow anything that is in view");
+        graph.skip(format!("casters {light}"), reason);
     }
 }
 

@@ -8,7 +8,7 @@
 //! Passes: parameters, one map pass a view, tiles, visibility. Tiles that see nothing or are turned
 //! away from the light are settled without a look at the map.
 
-use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
+use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views, note_left_out};
 use super::map::{MAP_SIZE, ShadowMap, add_maps};
 use super::receivers::add_receivers_in;
 use super::uniform::add_uniform;
@@ -70,6 +70,7 @@ pub(super) fn add_hard_at<'f>(
     let light = inputs.light;
     let scene = inputs.scene;
     let views = light_views(&light, &inputs.receivers, &scene.bounds(), 0.0);
+    note_left_out(graph, inputs, technique, &views);
     let [width, height] = inputs.camera.size();
 
     let mut params = HardParams {

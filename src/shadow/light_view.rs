@@ -1,6 +1,8 @@
 //! Views from a light's centre that together look at every receiver.
 
+use super::ShadowInputs;
 use super::casters::is_before;
+use crate::graph::Graph;
 use crate::light::AreaLight;
 use crate::scene::Aabb;
 use bytemuck::{Pod, Zeroable};
@@ -234,6 +236,24 @@ fn bounds_of(points: impl Iterator<Item = [f64; 2]>, margin: f64) -> ([f64; 2], 
         high[axis] += MARGIN * width + margin;
     }
     (low, high)
+}
+
+/// Notes in a graph which views of a light are left out, for those that look all round.
+pub(super) fn note_left_out(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    technique: &str,
+    views: &LightViews,
+) {
+    let (made, all) = (views.views.len(), cube_faces(&inputs.light).len());
+    // One view may be fitted to all that is in view, and then there are no others.
+    if (2..all).contains(&made) {
+        let reason = format!(
+            "{} of {all} views look at nothing that is in view",
+            all - made
+        );
+        graph.skip(format!("{technique}.views {}", inputs.light_name), reason);
+    }
 }
 
 impl LightViews {

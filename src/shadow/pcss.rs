@@ -6,7 +6,7 @@
 //! the light has its real size and shape, and depths are compared with the receiver's plane, so
 //! neither needs a bias.
 
-use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
+use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views, note_left_out};
 use super::map::{MAP_SIZE, add_maps};
 use super::receivers::add_receivers;
 use super::uniform::add_uniform;
@@ -80,6 +80,7 @@ pub(super) fn add_passes<'f>(
         (reach / nearest).min(MOST_MARGIN)
     };
     let views = light_views(&light, &inputs.receivers, &casters, margin);
+    note_left_out(graph, inputs, technique, &views);
     let mut params = PcssParams {
         counts: [views.views.len() as u32, MAP_SIZE, width, height],
         search: [nearest as f32, options.radius, 0.0, 0.0],

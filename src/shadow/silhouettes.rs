@@ -87,6 +87,8 @@ pub fn add_silhouettes(
 ) -> Silhouettes {
     let name = &inputs.light_name;
     if let Some(kept) = inputs.silhouettes {
+        let reason = "neither light nor casters have moved since the list was made";
+        graph.skip(format!("{technique}.silhouettes {name}"), reason);
         return kept;
     }
     assert!(

@@ -38,7 +38,7 @@ pub(super) use crowding::remark;
 
 pub use options::{Combine, SsocOptions};
 
-use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views};
+use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views, note_left_out};
 use super::map::{ShadowMap, add_maps_of};
 use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
@@ -118,6 +118,7 @@ pub(super) fn add_passes<'f>(
         f64::from(reach / far.max(f32::MIN_POSITIVE)).min(MOST_MARGIN)
     };
     let views = light_views(&light, &inputs.receivers, &casters, margin);
+    note_left_out(graph, inputs, NAME, &views);
     let [width, height] = inputs.camera.size();
     let mut params = SsocParams {
         counts: [views.views.len() as u32, options.resolution, width, height],

@@ -93,13 +93,13 @@ anywhere=(random_graphs_without_one_of_their_barriers choice:: failures:: interr
     wrong_names_of_images_exit_2 light_in_the_name_of_a_picture)
 gpu_job() {
     if [ ${#gpu_tests[@]} -eq 0 ]; then return; fi
-    start_job "GPU tests on $1" cargo test "${gpu_tests[@]}" -- --test-threads=1
+    start_job "GPU tests on $1" cargo test --no-fail-fast "${gpu_tests[@]}" -- --test-threads=1
 }
 driver_job() {
     if [ ${#driver_tests[@]} -eq 0 ]; then return; fi
     local skip=() name
     for name in "${anywhere[@]}"; do skip+=(--skip "$name"); done
-    start_job "GPU tests on $1" cargo test "${driver_tests[@]}" -- --test-threads=1 "${skip[@]}"
+    start_job "GPU tests on $1" cargo test --no-fail-fast "${driver_tests[@]}" -- --test-threads=1 "${skip[@]}"
 }
 # stress_job NAME [FILTER]
 stress_job() {
@@ -149,7 +149,7 @@ gpu_job "the system's lavapipe"
 on swiftshader stress_job every_case
 on lavapipe driver_job
 on lavapipe stress_job every_case
-start_job "unit and graph tests" cargo test --lib --bins --examples "${other_tests[@]}"
+start_job "unit and graph tests" cargo test --no-fail-fast --lib --bins --examples "${other_tests[@]}"
 start_job "documentation examples" cargo test --doc
 show_jobs
 

@@ -28,7 +28,8 @@ fn masks_are_those_of_rays_in_hard_cases() {
             found.level
         );
         println!("{title} {:?}", &found.off[..found.off.len().min(8)]);
-        if found.part > MOST || found.others > 2 {
+        // Which triangle a pixel shows is the driver's business: those of others are left out, and are few.
+        if found.part > MOST || found.others * 200 > found.pixels {
             faults.push(title);
         }
     }

@@ -71,7 +71,10 @@ fn images(root: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
             }
             let ending = path.extension().unwrap_or_default();
             assert!(ending != "part", "{path:?}");
-            if !["json", "html", "svg"].iter().any(|other| ending == *other) {
+            if !["json", "html", "svg", "md"]
+                .iter()
+                .any(|other| ending == *other)
+            {
                 found.insert(path.strip_prefix(root)?.into(), fs::read(&path)?);
             }
         }

@@ -7,8 +7,8 @@ use antumbra::capture::exr;
 use serde_json::json;
 
 use super::program::{
-    COURT, Result, SPHERE, antumbra, assert_fails, capture, capture_command, changed_scene, names,
-    node, run,
+    COURT, Result, SPHERE, antumbra, assert_fails, capture, capture_command, changed_scene,
+    default_capture_command, names, node, run,
 };
 
 #[test]
@@ -330,7 +330,7 @@ fn a_bound_that_is_not_reached_is_a_failure() -> Result {
     let folder = tempfile::tempdir()?;
     let at = |name: &str| folder.path().join(name);
     let with_bound = |bound: &str| {
-        let mut command = capture_command(SPHERE, "64x48");
+        let mut command = default_capture_command(SPHERE, "64x48");
         command
             .args(["--technique", "shaft-masks", "--bound", bound])
             .arg("--visibility")

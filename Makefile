@@ -54,6 +54,8 @@ bench:
 bench-check:
 	scripts/report_browser.py $(OUT)/report.html $(OUT)/screenshots
 
+# At the size of the errors that the README names.
+pictures: SIZE = 256x256
 pictures: bench
 	scripts/readme_pictures.py $(OUT) docs/pictures
 

@@ -16,7 +16,7 @@ use crate::light::AreaLight;
 use crate::message::{line, one_line};
 use crate::scene::{Scene, SceneCamera};
 
-/// Frames before the measured ones.
+/// Frames at the very beginning, of which the first makes what is made once.
 const WARM_UP_FRAMES: usize = 2;
 
 /// What one round has to say.
@@ -34,6 +34,9 @@ pub(super) struct Round {
 pub(super) trait Runner {
     /// Everything before the measured rounds, warm-up included.
     fn prepare(&mut self) -> Result<Setup, String>;
+    /// What goes before each round and does not count: others have had the machine, and memory that was given
+    /// back in between is new to the caches and to the page tables.
+    fn warm_up(&mut self) -> Result<(), String>;
     /// One measured round.
     fn round(&mut self) -> Result<Round, String>;
     fn driver(&self) -> Option<String> {
@@ -89,7 +92,8 @@ impl<'s> Cell<'s> {
 
     fn measure(&mut self) {
         let start = Instant::now();
-        let Some(mut round) = self.guarded(|runner| runner.round()) else {
+        let round = self.guarded(|runner| runner.warm_up().and_then(|()| runner.round()));
+        let Some(mut round) = round else {
             return;
         };
         self.spent += start.elapsed().as_secs_f64();
@@ -266,6 +270,10 @@ impl Runner for GpuRunner<'_> {
         })
     }
 
+    fn warm_up(&mut self) -> Result<(), String> {
+        self.render().map(|_| ())
+    }
+
     fn round(&mut self) -> Result<Round, String> {
         let frame = self.render()?;
         let Some(light) = frame.lights.into_iter().next() else {
@@ -369,15 +377,19 @@ impl RivalRunner<'_> {
 }
 
 impl Runner for RivalRunner<'_> {
-    /// Warms up with a small picture: a cast has no set-up of its own, and a large one is long.
     fn prepare(&mut self) -> Result<Setup, String> {
-        let small = self.size.map(|side| side.div_ceil(4));
-        self.cast(small)?;
+        self.warm_up()?;
         Ok(Setup {
             load: rounded(self.build_ms),
             pipelines: None,
             first_frame: None,
         })
+    }
+
+    /// A small picture: a cast has no set-up of its own, and a large one is long.
+    fn warm_up(&mut self) -> Result<(), String> {
+        let small = self.size.map(|side| side.div_ceil(4));
+        self.cast(small).map(|_| ())
     }
 
     fn round(&mut self) -> Result<Round, String> {
@@ -392,6 +404,7 @@ mod tests {
     /// Fails at a call, or panics at one.
     struct Fake {
         calls: u32,
+        warm_ups: u32,
         fails_at: u32,
         panics_at: u32,
     }
@@ -415,7 +428,13 @@ mod tests {
             })
         }
 
+        fn warm_up(&mut self) -> Result<(), String> {
+            self.warm_ups += 1;
+            Ok(())
+        }
+
         fn round(&mut self) -> Result<Round, String> {
+            assert_eq!(self.warm_ups, self.calls, "one before each round");
             self.call().map(|()| Round {
                 visibility: vec![self.calls.min(3) as f32],
                 visibility_ms: Some(f64::from(self.calls)),
@@ -427,6 +446,7 @@ mod tests {
     fn cell(label: &str, fails_at: u32, panics_at: u32) -> Cell<'static> {
         let fake = Fake {
             calls: 0,
+            warm_ups: 0,
             fails_at,
             panics_at,
         };

@@ -56,11 +56,13 @@ float pixel_visibility(uvec2 pixel) {
     float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
     vec3 n = unpack_unit(texelFetch(geometric_normal, ivec2(pixel), 0).x);
     vec3 p = params.camera.eye.xyz + depth * pixel_ray(params.camera, pixel);
-    bool sun = params.light.w == 0.0;
+    bool hit = depth > 0.0;
+    // Asking the pixel too changes nothing, but a branch on a uniform alone makes Mesa 22.3's software driver compile
+    // the shader anew for every dispatch, and keep what it compiled as long as the pipeline.
+    bool sun = hit && params.light.w == 0.0;
     vec3 to_light = sun ? params.light.xyz : params.light.xyz - p;
     vec3 q = sun ? p : -to_light;
     // On or below the receiver's tangent plane the light's centre is hidden.
-    bool hit = depth > 0.0;
     bool facing = dot(n, to_light) > 0.0;
     float visibility = hit && !facing ? 0.0 : 1.0;
     // Where no view looks, nothing that could block stands.

@@ -231,8 +231,8 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// Begins a frame: frees what the frame that last used this slot retired, resets its
-    /// descriptors, and makes its timings ready for [`Gpu::collect_timings`].
+    /// Begins a frame: frees what the frame that last used this slot retired, takes back its
+    /// descriptor sets, and makes its timings ready for [`Gpu::collect_timings`].
     ///
     /// On a host's device, the host calls this before it records a frame, once the frame
     /// `frames_in_flight` earlier has finished. On our own device [`Gpu::run`] does it.
@@ -245,7 +245,7 @@ impl Gpu {
         for object in garbage {
             self.free_retired(object);
         }
-        self.reset_descriptors()?;
+        self.reclaim_sets();
         self.begin_timestamps()
     }
 

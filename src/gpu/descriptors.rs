@@ -1,4 +1,8 @@
-//! Descriptor sets that live for one frame, and writes that are checked against the shader.
+//! Descriptor sets that belong to one frame, and writes that are checked against the shader.
+//!
+//! A set that a frame is done with is handed out again for the same layout; pools are never reset. Drivers need not
+//! allocate in each frame then, and Mesa's software driver, which loses the names of sets when their pool is reset,
+//! does not lose more with each frame.
 
 use std::collections::HashMap;
 
@@ -91,8 +95,6 @@ struct Pool {
     sets_left: u32,
     /// Descriptors left, by kind.
     left: HashMap<vk::DescriptorType, u32>,
-    sets: u32,
-    sizes: HashMap<vk::DescriptorType, u32>,
 }
 
 impl Pool {
@@ -107,7 +109,10 @@ impl Pool {
 #[derive(Default)]
 struct Slot {
     pools: Vec<Pool>,
+    /// Handed out in the frame.
     sets: HashMap<vk::DescriptorSet, vk::DescriptorSetLayout>,
+    /// Left over from earlier frames.
+    free: HashMap<vk::DescriptorSetLayout, Vec<vk::DescriptorSet>>,
 }
 
 pub(super) struct Descriptors {
@@ -149,6 +154,12 @@ impl Gpu {
                 what: "the pipeline",
             });
         };
+        let slot = &mut self.descriptors.slots[self.slot];
+        let free = slot.free.get_mut(&pipeline.set_layout);
+        if let Some(set) = free.and_then(Vec::pop) {
+            slot.sets.insert(set, pipeline.set_layout);
+            return Ok(set);
+        }
         let mut need = HashMap::new();
         for binding in &interface.key.bindings {
             *need.entry(binding.info.kind).or_insert(0) += binding.info.count;
@@ -204,9 +215,7 @@ impl Gpu {
         pools.push(Pool {
             raw,
             sets_left: SETS,
-            left: sizes.clone(),
-            sets: SETS,
-            sizes,
+            left: sizes,
         });
         let index = pools.len() - 1;
         self.set_name(raw, &format!("descriptor pool {}.{index}", self.slot));
@@ -368,23 +377,12 @@ impl Gpu {
         unsafe { self.device.update_descriptor_sets(&raw, &[]) };
     }
 
-    pub(super) fn reset_descriptors(&mut self) -> Result<(), GpuError> {
-        let slot = &mut self.descriptors.slots[self.slot];
-        slot.sets.clear();
-        for pool in &mut slot.pools {
-            if pool.sets_left == pool.sets {
-                continue;
-            }
-            // SAFETY: the frame that used the pool's sets has finished.
-            unsafe {
-                self.device
-                    .reset_descriptor_pool(pool.raw, vk::DescriptorPoolResetFlags::empty())
-            }
-            .call("vkResetDescriptorPool", "the frame's descriptors")?;
-            pool.sets_left = pool.sets;
-            pool.left.clone_from(&pool.sizes);
+    /// Takes back what the frame that last used the slot was given: it has finished.
+    pub(super) fn reclaim_sets(&mut self) {
+        let Slot { sets, free, .. } = &mut self.descriptors.slots[self.slot];
+        for (set, layout) in sets.drain() {
+            free.entry(layout).or_default().push(set);
         }
-        Ok(())
     }
 
     pub(super) fn destroy_descriptors(&mut self) {

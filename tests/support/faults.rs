@@ -1,6 +1,8 @@
 //! A device's functions, of which one fails when it is told to: what a driver without memory, or a device
 //! that is lost, does to a frame. A call that fails never reaches the driver.
 
+use std::backtrace::Backtrace;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use antumbra::ash;
@@ -21,12 +23,15 @@ struct State {
     real: Option<ash::Device>,
     fault: Fault,
     calls: Vec<&'static str>,
+    /// Of each call, while they are asked for.
+    sites: Option<Vec<u64>>,
 }
 
 static STATE: Mutex<State> = Mutex::new(State {
     real: None,
     fault: Fault::None,
     calls: Vec::new(),
+    sites: None,
 });
 
 fn state() -> MutexGuard<'static, State> {
@@ -38,6 +43,19 @@ pub fn arm(fault: Fault) {
     let mut state = state();
     state.fault = fault;
     state.calls.clear();
+    state.sites = None;
+}
+
+/// As [`arm`] without a fault, and notes where each call comes from.
+pub fn trace() {
+    arm(Fault::None);
+    state().sites = Some(Vec::new());
+}
+
+/// Where the calls since [`trace`] come from: the same number where functions and lines of the whole stack are
+/// the same. Passes are recorded by functions of their own, so each has its own.
+pub fn sites() -> Vec<u64> {
+    state().sites.clone().unwrap_or_default()
 }
 
 /// The calls that can fail since [`arm`], those that failed among them, by their names.
@@ -50,9 +68,19 @@ const ASK_THE_DEVICE: [&str; 3] = ["vkQueueSubmit2", "vkWaitForFences", "vkGetQu
 
 /// Counts a call; what it returns if it fails.
 fn refuse(call: &'static str) -> Option<vk::Result> {
+    let traced = state().sites.is_some();
+    // Not under the lock: it takes milliseconds.
+    let site = traced.then(|| {
+        let mut hasher = DefaultHasher::new();
+        Backtrace::force_capture().to_string().hash(&mut hasher);
+        hasher.finish()
+    });
     let mut state = state();
     let index = state.calls.len();
     state.calls.push(call);
+    if let (Some(sites), Some(site)) = (&mut state.sites, site) {
+        sites.push(site);
+    }
     let out_of_memory = match call {
         "vkAllocateMemory" => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
         "vkMapMemory" => vk::Result::ERROR_MEMORY_MAP_FAILED,

@@ -15,7 +15,7 @@ use antumbra::light::{AreaLight, LightShape};
 use antumbra::reference::{Pattern, Reference, Sampling, Settings, Surface};
 use antumbra::scene::{LoadOptions, Scene, SceneCamera};
 use antumbra::shadow::shaft_masks::light_samples;
-use glam::{DVec3, UVec2};
+use glam::{DVec3, UVec2, Vec3};
 use std::path::Path;
 use support::plates::{self, HEIGHT, floor, floor_x, plate};
 use support::rig::with_renderer;
@@ -259,6 +259,35 @@ fn masks_are_those_of_rays_on_all_scenes() {
         check(name, 8);
         check(name, 16);
     }
+}
+
+/// Rows of a sphere's samples lie along its first axis, or the second where that is along the line of sight: the border
+/// between the two runs through the picture, and with it through tiles.
+#[test]
+fn rows_of_a_sphere_may_turn_within_a_tile() {
+    let _one = support::serial();
+    let mut partly = 0;
+    for step in -4..=4 {
+        let turn = 0.9_f32.acos() + 0.02 * step as f32;
+        let axis = Vec3::new(turn.sin(), -turn.cos(), 0.0);
+        let near = |i: i32| 0.7 * i as f32 + 0.05 * step as f32;
+        let places = (-3..=3).flat_map(|i| (-3..=3).map(move |j| [near(i), near(j)]));
+        let plates = places.map(|[x, z]| plate("plate", [x, x + 0.4], [z, z + 0.5], 9.0));
+        let primitives = plates.chain([floor()]).collect();
+        let mut scene = plates::scene(primitives, LightShape::Sphere { radius: 1.0 });
+        let light = &mut scene.lights[0].light;
+        *light = AreaLight::new(light.shape, light.center, Vec3::Z, axis);
+        let light = *light;
+        let camera = plates::camera();
+        let images = render(&scene, &camera, &[&technique(8)]);
+        let reference = Reference::new(&scene).unwrap();
+        let (images, surfaces) = &images[0];
+        let found = compare(&reference, &camera, &light, 8, (&images[0], surfaces));
+        println!("{step}: {} in {:?}", found.part, found.off);
+        partly += found.partly;
+        assert!(found.part <= MOST, "{} in {:?}", found.part, found.off);
+    }
+    assert!(partly > 10_000, "{partly}");
 }
 
 #[test]

@@ -16,12 +16,13 @@ struct TileBounds {
     float nearest;    // view depth in metres of what was hit; farthest is 0 where nothing was
     float farthest;
     bool all_hit;     // no pixel of the tile missed
+    bool one_triangle; // all pixels show one, or nothing
     vec3 normal_low;  // box around the geometric normals
     vec3 normal_high;
 };
 
 TileBounds tile_bounds_of(vec4 depths, vec4 low, vec4 high) {
-    return TileBounds(depths.x, depths.y, depths.z > 0.0, low.xyz, high.xyz);
+    return TileBounds(depths.x, depths.y, depths.z > 0.0, low.w > 0.0, low.xyz, high.xyz);
 }
 
 // Arguments of an indirect dispatch over a list of tiles, and how many there are.

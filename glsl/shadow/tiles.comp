@@ -44,11 +44,11 @@ void main() {
         turned_away = turned_away && most < -SLACK * length(to_light);
     }
     if (empty || turned_away) {
-        vec4 value = vec4(empty ? 1.0 : 0.0);
-        for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
+        uint pixels = empty ? 0u : TILE_SIZE * TILE_SIZE; // all is lit at the beginning
+        for (uint i = 0u; i < pixels; ++i) {
             // Stores beyond the picture's border are dropped.
             uvec2 pixel = tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);
-            imageStore(visibility, ivec2(pixel), value);
+            imageStore(visibility, ivec2(pixel), vec4(0.0));
         }
     } else {
         uint slot = atomicAdd(arguments.count, 1u);

@@ -92,7 +92,7 @@ shared uint counted[2u][CHUNK];
 shared uint counted_count[3u];
 shared uint covers[MOST_COVERS];
 shared uint cover_count;
-shared uint seen_corners[MOST_COVERS]; // pairs of corners that do not see each other
+shared uint seen_corners[MOST_COVERS]; // of the surfaces' box, that see some of the light past it
 
 vec4 fetch_triangle_texel(uint texel) {
     return texelFetch(triangles, triangle_texel_place(texel), 0);
@@ -144,27 +144,25 @@ uint counted_side(Surfaces surfaces, Triangle t) {
     return is_whole(surfaces, t) ? triangle_side(surfaces, t.corners[0], t.plane.xyz) : SIDE_UNSURE;
 }
 
-// Corner 0 to 7 of a box around the light; of a sun a direction.
-vec3 light_corner(Light light, mat3 frame, uint corner) {
-    vec3 side = vec3(uvec3(corner, corner >> 1, corner >> 2) & 1u) * 2.0 - 1.0;
-    return light.center.xyz + frame * (side * light_half_size(light));
-}
-
-// Whether p sees the end l (of a sun: the direction) through the triangle, with a margin.
-bool sees_through(vec3 p, vec3 l, Triangle t, float margin_m) {
+// Whether p sees all of a box around the light through the triangle, with a margin. half_size: of the box, in its
+// frame; of a sun the box holds directions.
+bool sees_through(vec3 p, Light light, mat3 frame, vec3 half_size, Triangle t, float margin_m) {
     vec3 a = t.corners[0] - p;
     vec3 b = t.corners[1] - p;
     vec3 c = t.corners[2] - p;
-    vec3 to = LIGHT_SHAPE == LIGHT_SUN ? l : l - p;
+    vec3 to = light_offset(light, p);
     float height = dot(t.plane.xyz, a);
-    float fall = dot(t.plane.xyz, to);
     float turn = height > 0.0 ? 1.0 : -1.0;
-    bool between = abs(height) > margin_m && turn * fall > 0.0
-        && (LIGHT_SHAPE == LIGHT_SUN || turn * fall > abs(height));
-    vec3 edges = vec3(dot(cross(a, b), to), dot(cross(b, c), to), dot(cross(c, a), to));
+    float fall = turn * dot(t.plane.xyz, to) - dot(abs(t.plane.xyz * frame), half_size);
+    bool between = abs(height) > margin_m && fall > (LIGHT_SHAPE == LIGHT_SUN ? 0.0 : abs(height));
+    vec3 ab = cross(a, b);
+    vec3 bc = cross(b, c);
+    vec3 ca = cross(c, a);
+    vec3 edges = turn * vec3(dot(ab, to), dot(bc, to), dot(ca, to));
+    edges -= vec3(dot(abs(ab * frame), half_size), dot(abs(bc * frame), half_size), dot(abs(ca * frame), half_size));
     vec3 lengths = vec3(length(a), length(b), length(c));
-    vec3 margins = margin_m * length(to) * (lengths + lengths.yzx);
-    return between && all(greaterThan(turn * edges, margins));
+    vec3 margins = margin_m * (length(to) + length(half_size)) * (lengths + lengths.yzx);
+    return between && all(greaterThan(edges, margins));
 }
 
 float cover_margin_m(Surfaces surfaces, Triangle t) {
@@ -179,14 +177,21 @@ vec3 surfaces_corner(Surfaces surfaces, uint corner) {
     return surfaces.center + side.x * surfaces.axes[0] + side.y * surfaces.axes[1] + side.z * surfaces.axes[2];
 }
 
+// Whether light_from chooses the same axis of a sphere for all surfaces, with a margin.
+bool rows_have_one_axis(Light light, Surfaces surfaces) {
+    float along = abs(dot(surfaces.z, light.axis_x.xyz));
+    return abs(along - NEAR_AXIS) > surfaces.tilt + 1.0e-5;
+}
+
 // Stages an edge: one that is beyond the samples on the side that edges count towards, or beyond the ends of
 // all rows, seen from every surface, is left out.
-void stage_edge(Shaft shaft, vec3 a, vec3 b, uint code) {
+// one_axis: rows lie along the same axis of a sphere for all surfaces.
+void stage_edge(Shaft shaft, bool one_axis, vec3 a, vec3 b, uint code) {
     bool beyond = false;
     bool outside = false;
-    // The rows of a sphere's disk turn a little from pixel to pixel, and those of a rectangle rise: what is below it
-    // may cross them before their first sample.
-    uint last = LIGHT_SHAPE == LIGHT_SPHERE ? 1u : LIGHT_SHAPE == LIGHT_RECT ? 3u : 4u;
+    // The rows of a sphere's disk turn a little from pixel to pixel, and by a right angle where they lie along another
+    // axis; those of a rectangle rise: what is below it may cross them before their first sample.
+    uint last = LIGHT_SHAPE == LIGHT_SPHERE ? (one_axis ? 1u : 0u) : LIGHT_SHAPE == LIGHT_RECT ? 3u : 4u;
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         vec4 plane = shaft.planes[i];
         bool both = dot(plane.xyz, a) > plane.w && dot(plane.xyz, b) > plane.w;
@@ -221,7 +226,7 @@ void add_edge(Shaft shaft, Surfaces surfaces, uint triangle, uint corner, uint s
     bool fold = both && !goes_on;
     if (!goes_on && !(fold && other < triangle)) {
         uint code = triangle << EDGE_CORNER_BITS | corner | (fold ? EDGE_DOUBLE : 0u);
-        stage_edge(shaft, a, b, code | (side == SIDE_BACK ? EDGE_TURNED : 0u));
+        stage_edge(shaft, rows_have_one_axis(view.light, surfaces), a, b, code | (side == SIDE_BACK ? EDGE_TURNED : 0u));
     }
 }
 
@@ -272,12 +277,16 @@ void main() {
     uint last = first_triangle + candidates.y - 1u;
     uint chunk = candidates.x;
     uint turn = 0u;
-    for (uint begin = 0u; begin < candidates.y; begin += CHUNK) {
+    uint begin = 0u;
+    // Loops look at their end whether they go on: a driver without branches does one more turn of others, for nothing.
+    do {
         uint end = min(CHUNK, candidates.y - begin);
-        for (uint i = lane; i < end; i += gl_WorkGroupSize.x) {
-            uint triangle = texelFetch(pool, chunk_entry_place(chunk, i), 0).x;
+        uint i = lane;
+        do {
+            bool is_listed = i < end;
+            uint triangle = is_listed ? texelFetch(pool, chunk_entry_place(chunk, i), 0).x : 0u;
             Triangle t = fetch_triangle(triangle);
-            if (meets(shaft, t)) {
+            if (is_listed && meets(shaft, t)) {
                 bool between = is_whole(surfaces, t);
                 uint side = triangle_side(surfaces, t.corners[0], t.plane.xyz);
                 uint side_of_light = light_side(surfaces, view.light, frame, t.corners[0], t.plane.xyz);
@@ -294,26 +303,32 @@ void main() {
                     imageStore(triangle_pool, triangle_texel_place(at), uvec4(triangle));
                 }
                 float margin_m = cover_margin_m(surfaces, t);
-                if (!material_is_masked(t.plane.w) && sees_through(some, view.light.center.xyz, t, margin_m)) {
+                if (!material_is_masked(t.plane.w) && sees_through(some, view.light, frame, vec3(0.0), t, margin_m)) {
                     uint cover = atomicAdd(cover_count, 1u);
                     if (cover < MOST_COVERS) {
                         covers[cover] = triangle;
                     }
                 }
             }
-        }
+            i += gl_WorkGroupSize.x;
+        } while (i < end);
         if (lane == 0u) {
             counted_count[(turn + 1u) % 3u] = 0u;
         }
         barrier();
         uint corners = 3u * counted_count[turn % 3u];
-        for (uint i = lane; i < corners; i += gl_WorkGroupSize.x) {
-            uint code = counted[turn % 2u][i / 3u];
-            add_edge(shaft, surfaces, code >> 1, i % 3u, (code & 1u) != 0u ? SIDE_BACK : SIDE_FRONT);
-        }
+        i = lane;
+        do {
+            uint code = counted[turn % 2u][min(i / 3u, CHUNK - 1u)];
+            if (i < corners) {
+                add_edge(shaft, surfaces, code >> 1, i % 3u, (code & 1u) != 0u ? SIDE_BACK : SIDE_FRONT);
+            }
+            i += gl_WorkGroupSize.x;
+        } while (i < corners);
         chunk = texelFetch(pool, chunk_entry_place(chunk, CHUNK), 0).x;
         turn += 1u;
-    }
+        begin += CHUNK;
+    } while (begin < candidates.y);
     barrier();
 
     // A list that ends early is not used: an edge between a triangle in the list and one that found no room in it
@@ -326,12 +341,13 @@ void main() {
     }
     // Whether a triangle is between all surfaces and all of the light: sides of its edges are bilinear in the two ends
     // of a segment, so corners decide.
-    uint pairs = 64u * min(cover_count, MOST_COVERS);
-    for (uint i = lane; i < pairs; i += gl_WorkGroupSize.x) {
-        Triangle t = fetch_triangle(covers[i / 64u]);
+    uint corners = 8u * min(cover_count, MOST_COVERS);
+    vec3 light_half = light_half_size(view.light);
+    for (uint i = lane; i < corners; i += gl_WorkGroupSize.x) {
+        Triangle t = fetch_triangle(covers[i / 8u]);
         vec3 p = surfaces_corner(surfaces, i & 7u);
-        if (!sees_through(p, light_corner(view.light, frame, i >> 3 & 7u), t, cover_margin_m(surfaces, t))) {
-            seen_corners[i / 64u] = 1u;
+        if (!sees_through(p, view.light, frame, light_half, t, cover_margin_m(surfaces, t))) {
+            seen_corners[i / 8u] = 1u;
         }
     }
     barrier();
@@ -355,12 +371,12 @@ void main() {
     uint others = fits ? other_count : 0u;
     uint resume = fits ? params.counts.z : 0u;
     vec2 depths = fetch_part_depths(part);
-    for (uint i = lane; i < TILE_SIZE * TILE_SIZE && settled; i += gl_WorkGroupSize.x) {
+    for (uint i = lane; i < TILE_SIZE * TILE_SIZE && dark; i += gl_WorkGroupSize.x) { // all is lit at the beginning
         // Stores beyond the picture's border are dropped.
         uvec2 pixel = tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);
         float depth = texelFetch(view_depth, ivec2(min(pixel, size - 1u)), 0).x;
-        if (is_in_part(depths, depth)) {
-            imageStore(visibility, ivec2(pixel), vec4(depth > 0.0 && dark ? 0.0 : 1.0));
+        if (is_in_part(depths, depth) && depth > 0.0) {
+            imageStore(visibility, ivec2(pixel), vec4(0.0));
         }
     }
     for (uint i = (lane + 1u) * TASK_ENTRIES; i < whole + others && !settled; i += gl_WorkGroupSize.x * TASK_ENTRIES) {

@@ -195,14 +195,20 @@ void main() {
             }
         }
         uint edges = push.further != 0u ? 0u : entries.edges;
-        for (uint at_edge = 0u; at_edge < edges; ++at_edge) {
-            uint code = texelFetch(edge_pool, triangle_texel_place(entries.first_edge + at_edge), 0).x;
-            vec3 a = fetch_edge_begin(code);
-            vec3 b = fetch_edge_end(code);
-            [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-                count_edge(from[i], a, b, code, digits[i], sums[i]);
+        uint at_edge = 0u;
+        // Loops look at their end whether they go on: a driver without branches does one more turn of others, for
+        // nothing.
+        do {
+            if (at_edge < edges) {
+                uint code = texelFetch(edge_pool, triangle_texel_place(entries.first_edge + at_edge), 0).x;
+                vec3 a = fetch_edge_begin(code);
+                vec3 b = fetch_edge_end(code);
+                [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+                    count_edge(from[i], a, b, code, digits[i], sums[i]);
+                }
             }
-        }
+            at_edge += 1u;
+        } while (at_edge < edges);
         bool spilled[4];
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {
             bool fits;
@@ -224,25 +230,33 @@ void main() {
         }
         uint first = push.further != 0u ? task.y : 0u;
         uint end = min(first + TASK_ENTRIES, entries.whole);
-        for (uint at_whole = first; at_whole < end; ++at_whole) {
-            uint triangle = texelFetch(triangle_pool, triangle_texel_place(entries.first + at_whole), 0).x;
-            vec3 a = fetch_triangle_texel(4u * triangle).xyz;
-            vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
-            vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
-            [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-                add_whole(from[i], a, b, c, blocked[i]);
+        uint at_whole = first;
+        do {
+            if (at_whole < end) {
+                uint triangle = texelFetch(triangle_pool, triangle_texel_place(entries.first + at_whole), 0).x;
+                vec3 a = fetch_triangle_texel(4u * triangle).xyz;
+                vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
+                vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
+                [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+                    add_whole(from[i], a, b, c, blocked[i]);
+                }
             }
-        }
+            at_whole += 1u;
+        } while (at_whole < end);
         end = min(first + TASK_ENTRIES, entries.whole + entries.others);
         LightFrom lights[4];
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {
             lights[i] = rows_from(view.light, receivers[i].position);
         }
-        for (uint at_other = max(first, entries.whole); at_other < end; ++at_other) {
-            uint place = entries.first + entries.room - 1u - (at_other - entries.whole);
-            Blocker blocker = fetch_blocker(texelFetch(triangle_pool, triangle_texel_place(place), 0).x);
-            add_blocker(receivers, lights, block, blocker, blocked);
-        }
+        uint at_other = max(first, entries.whole);
+        do {
+            if (at_other < end) {
+                uint place = entries.first + entries.room - 1u - (at_other - entries.whole);
+                Blocker blocker = fetch_blocker(texelFetch(triangle_pool, triangle_texel_place(place), 0).x);
+                add_blocker(receivers, lights, block, blocker, blocked);
+            }
+            at_other += 1u;
+        } while (at_other < end);
     } else {
         LightFrom lights[4];
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {

@@ -42,7 +42,7 @@ LightFrom light_from(Light light, vec3 p) {
     float square = max(dot(center, center), 1.0e-37);
     float rest = max(1.0 - light.axis_x.w * light.axis_x.w / square, 0.0);
     vec3 along = center * inversesqrt(square);
-    vec3 near = abs(dot(along, light.axis_x.xyz)) < 0.9 ? light.axis_x.xyz : light.axis_y.xyz;
+    vec3 near = abs(dot(along, light.axis_x.xyz)) < NEAR_AXIS ? light.axis_x.xyz : light.axis_y.xyz;
     vec3 x = normalize(near - along * dot(near, along));
     vec3 y = cross(along, x);
     turn_axes(x, y);
@@ -72,8 +72,14 @@ vec4 light_rows[ROWS];
 // Four times y and z, z plus 1.5.
 vec2 light_quads[ROWS];
 
+// Of a line, whose rows lie one after the other: the block's first sample, and the bits of a row's number of samples.
+int line_first;
+int line_bits;
+
 void fetch_light_rows(uint block) {
     uint across = params.pattern.x;
+    line_bits = findMSB(COLUMNS * across);
+    line_first = int((block / across * ROWS << line_bits) + block % across * COLUMNS);
     for (uint r = 0u; r < ROWS; ++r) {
         light_rows[r] = params.rows[block / across * ROWS + r];
         light_rows[r].z -= float(block % across * COLUMNS);
@@ -281,6 +287,18 @@ float line_least(vec3 line) {
     return line.z - abs(line.x) - abs(line.y);
 }
 
+// The samples of a line from the place on.
+uvec2 line_mask_from(float place) {
+    vec4 row = params.rows[0];
+    float most = 8.0 * row.y; // four times the number of all samples
+    precise float shifted = clamp(4.0 * (row.y * place + row.z) + 1.5, 0.0, most + 1.5) + TO_INTEGER;
+    int before = int((floatBitsToUint(shifted) & 0xffffu) >> 2) - line_first;
+    int rows = before >> line_bits;
+    int bit = clamp(int(COLUMNS) * rows + min(before - (rows << line_bits), int(COLUMNS)), 0, int(COLUMNS * ROWS));
+    uint low = ~0u << (bit & 31);
+    return uvec2(bit < 32 ? low : 0u, bit < 32 ? ~0u : bit < 64 ? low : 0u);
+}
+
 // The samples within the line.
 uvec2 mask_of_line(vec3 line) {
     // A line along the rows crosses them far out: there only its side counts.
@@ -289,6 +307,9 @@ uvec2 mask_of_line(vec3 line) {
     float inverse = -1.0 / across;
     float slope = line.y * inverse;
     float at = line.z * inverse;
+    if (LIGHT_SHAPE == LIGHT_LINE) {
+        return line_mask_from(at) ^ (across < 0.0 ? ~0u : 0u);
+    }
     uint flip = across < 0.0 ? 0xffu : 0u;
     uvec2 within = uvec2(0u);
     for (uint r = 0u; r < ROWS; ++r) {

@@ -106,6 +106,9 @@ bool shaft_meets_triangle(Shaft shaft, vec3 a, vec3 b, vec3 c) {
     return meets;
 }
 
+// Rows of a sphere's samples lie along its first axis as long as that is not nearer to the line of sight: as a cosine.
+const float NEAR_AXIS = 0.9;
+
 // The axes of a round light that its rows of samples lie along.
 void turn_axes(inout vec3 x, inout vec3 y) {
     vec3 old = x;
@@ -121,7 +124,7 @@ mat3 light_frame(Light light, vec3 p) {
         vec3 from = p - light.center.xyz;
         float square = dot(from, from);
         z = square > 0.0 ? from * inversesqrt(square) : z;
-        vec3 near = abs(dot(z, light.axis_x.xyz)) < 0.9 ? light.axis_x.xyz : light.axis_y.xyz;
+        vec3 near = abs(dot(z, light.axis_x.xyz)) < NEAR_AXIS ? light.axis_x.xyz : light.axis_y.xyz;
         vec3 x = normalize(near - z * dot(near, z));
         return mat3(x, cross(z, x), z);
     }

@@ -1,8 +1,7 @@
 #version 460
 // The shaft of each listed tile, or of the parts of a tile that spans a gap in depth, which it lists: the hull of two
 // boxes, around its surfaces and around the light, along the axes of the light. Surfaces that are turned away from
-// the light see none of it whatever is listed, and are left out. One invocation a tile: all do the same work, without
-// barriers.
+// the light see none of it whatever is listed, and are left out. One invocation a tile, without barriers.
 
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
@@ -100,6 +99,19 @@ mat3 surface_frame(uvec2 pixel, vec3 ray) {
     return mat3(x, cross(z, x), z);
 }
 
+// How far rounding may move a point of a triangle along its ray, metres: view depth is a quotient of two
+// distances from the triangle's plane, small ones where it is seen at a grazing angle.
+float depth_rounding_m(uvec2 pixel, float farthest) {
+    uint id = texelFetch(ids, ivec2(pixel), 0).x;
+    vec3 from_eye = fetch_triangle_texel(4u * (max(id, 1u) - 1u)).xyz - view.camera.eye.xyz;
+    vec3 n = fetch_geometric_normal(max(id, 1u) - 1u);
+    float far_m = farthest * length(vec2(view.camera.pixel_right.w * length(view.camera.pixel_right.xyz),
+        view.camera.pixel_down.w * length(view.camera.pixel_down.xyz)) + 1.0);
+    float away = abs(dot(n, from_eye));
+    float part = SLACK * (length(from_eye) + 2.0 * far_m);
+    return part < away ? far_m * part / away : far_m;
+}
+
 // Surfaces of shaft_masks/sides.glsl. low, high: of the box in its frame, from its base. some: one of them.
 void store_surfaces(ivec2 place, Light light, vec3 base, vec3 some, mat3 frame, vec3 low, vec3 high, float slack,
     vec2 depths) {
@@ -140,68 +152,10 @@ void store_surfaces(ivec2 place, Light light, vec3 base, vec3 some, mat3 frame, 
     imageStore(shafts, place + ivec2(5, 0), vec4(least, most, radius, end));
 }
 
-void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= arguments.count) {
-        return;
-    }
+// The shaft of a tile's pixels of these view depths. at: one of them, for the frames.
+void store_shaft(Light light, uvec2 tile, uvec2 tiles, TileBounds bounds, vec2 depths, uvec2 at, bool behind) {
     uvec2 size = params.counts.xy;
-    uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
-    uvec2 tile = tile_of_entry(texelFetch(list, tile_entry_place(index, tiles), 0).x, tiles);
-    Light light = view.light;
     vec3 eye = view.camera.eye.xyz;
-
-    // The gap in the middle of the depths of surfaces that are not turned away, if there is room for one.
-    ivec2 bounds_place = ivec2(tile.x * TILE_TEXELS, tile.y);
-    TileBounds bounds = tile_bounds_of(texelFetch(tile_bounds, bounds_place, 0),
-        texelFetch(tile_bounds, bounds_place + ivec2(1, 0), 0), texelFetch(tile_bounds, bounds_place + ivec2(2, 0), 0));
-    float width = bounds.nearest * float(TILE_SIZE) * length(view.camera.pixel_right.xyz);
-    uint looks = bounds.farthest - bounds.nearest > width || !bounds.all_hit ? TILE_SIZE * TILE_SIZE : 0u;
-    // Normals are looked at where some of them may be turned away.
-    vec3 near_light = light_offset(light, eye + bounds.farthest * pixel_ray(view.camera, tile * TILE_SIZE));
-    bool turns = MOST_PARTS > 1u && -most_along(bounds.normal_low, bounds.normal_high, -near_light) < 0.0;
-    uint normal_looks = turns ? looks : 0u;
-    float nearest = turns ? FAR : bounds.nearest;
-    float farthest = turns ? 0.0 : bounds.farthest;
-    uvec2 seen = uvec2(turns ? 0u : ~0u);
-    for (uint i = 0u; i < normal_looks; ++i) {
-        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
-        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
-        vec3 ray = pixel_ray(view.camera, pixel);
-        bool counts = depth > 0.0
-            && !is_turned_away(light, eye + depth * ray, fetch_normal(texelFetch(ids, ivec2(pixel), 0).x, ray));
-        nearest = counts ? min(nearest, depth) : nearest;
-        farthest = counts ? max(farthest, depth) : farthest;
-        uint bit = counts ? 1u << (i & 31u) : 0u;
-        seen |= i < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
-    }
-    float middle = 0.5 * nearest + 0.5 * farthest;
-    float before_gap = 0.0;
-    float after_gap = FAR;
-    uvec2 at_near = tile * TILE_SIZE;
-    uvec2 at_far = tile * TILE_SIZE;
-    for (uint i = 0u; i < looks; ++i) {
-        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
-        bool counts = ((i < 32u ? seen.x : seen.y) >> (i & 31u) & 1u) != 0u;
-        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
-        counts = counts && depth > 0.0;
-        depth = counts ? depth : -1.0;
-        at_near = depth < middle && depth > before_gap ? pixel : at_near;
-        before_gap = depth < middle ? max(before_gap, depth) : before_gap;
-        after_gap = counts && depth >= middle ? min(after_gap, depth) : after_gap;
-        at_far = depth == farthest ? pixel : at_far;
-    }
-    float gap = after_gap - before_gap;
-    bool both = before_gap > 0.0 && after_gap < FAR;
-    bool split = MOST_PARTS > 1u && both && gap > width && gap > LEAST_GAP * (farthest - nearest);
-    bool behind = gl_GlobalInvocationID.y > 0u;
-    if (behind && !split) {
-        return;
-    }
-    vec2 depths = !split ? vec2(0.0, FAR) : behind ? vec2(after_gap, FAR) : vec2(0.0, after_gap);
-
-    // Some pixel, for the frames.
-    uvec2 at = split && !behind ? at_near : at_far;
     vec3 base = eye + texelFetch(view_depth, ivec2(at), 0).x * pixel_ray(view.camera, at);
     mat3 frame = light_frame(light, base);
     mat3 box_frame = surface_frame(at, pixel_ray(view.camera, at));
@@ -225,8 +179,13 @@ void main() {
     vec3 normal = vec3(0.0);
     float plane_low = FAR;
     float plane_high = -FAR;
-    for (uint i = 0u; i < TILE_SIZE * TILE_SIZE; ++i) {
-        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
+    // Where a tile shows one triangle, or nothing, what is between its corners is between their surfaces.
+    uint looks = bounds.one_triangle ? 4u : TILE_SIZE * TILE_SIZE;
+    uint across_bits = bounds.one_triangle ? 1u : 3u; // of TILE_SIZE pixels
+    uint step = bounds.one_triangle ? TILE_SIZE - 1u : 1u;
+    for (uint i = 0u; i < looks; ++i) {
+        uvec2 within = uvec2(i & ((1u << across_bits) - 1u), i >> across_bits);
+        uvec2 pixel = min(tile * TILE_SIZE + step * within, size - 1u);
         float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
         uint id = texelFetch(ids, ivec2(pixel), 0).x;
         if (depth > 0.0 && is_in_part(depths, depth)) {
@@ -255,14 +214,15 @@ void main() {
             own_high = max(own_high, own);
         }
     }
+    float between_m = bounds.one_triangle ? depth_rounding_m(at, bounds.farthest) : 0.0;
     vec3 extent = max(max(abs(box_low), abs(box_high)), abs(eye));
     if (LIGHT_SHAPE != LIGHT_SUN) {
         extent = max(extent, abs(light.center.xyz) + light_reach);
     }
     float extent_m = max(extent.x, max(extent.y, extent.z));
     float slack = SLACK * 4.0 * extent_m;
-    low -= slack;
-    high += slack;
+    low -= slack + between_m;
+    high += slack + between_m;
 
     vec4 planes[SHAFT_PLANES];
     vec3 right = hull_side(half_size.xz, high.x, low.z, high.z);
@@ -302,16 +262,17 @@ void main() {
     if (LIGHT_SHAPE == LIGHT_SUN) {
         // A box around a cone without end has sides at most where no direction leads.
         vec3 reach = abs(frame[0]) * half_size.x + abs(frame[1]) * half_size.y;
-        box_low = mix(box_low, vec3(-FAR), lessThan(frame[2] - reach, vec3(SLACK)));
-        box_high = mix(box_high, vec3(FAR), greaterThan(frame[2] + reach, vec3(-SLACK)));
+        box_low = mix(box_low - between_m, vec3(-FAR), lessThan(frame[2] - reach, vec3(SLACK)));
+        box_high = mix(box_high + between_m, vec3(FAR), greaterThan(frame[2] + reach, vec3(-SLACK)));
     } else {
-        box_low = min(box_low, light.center.xyz - light_reach);
-        box_high = max(box_high, light.center.xyz + light_reach);
+        box_low = min(box_low - between_m, light.center.xyz - light_reach);
+        box_high = max(box_high + between_m, light.center.xyz + light_reach);
     }
+    vec3 own_slack = vec3(vec2(slack + between_m), slack); // depths are off along the rays, not across the surface
     uvec2 part = uvec2(tile.x, tile.y + (behind ? tiles.y : 0u));
     ivec2 place = ivec2(part.x * SHAFT_TEXELS, part.y);
-    store_surfaces(place + ivec2(SHAFT_PLANES + 2u, 0), light, base, some, box_frame, own_low - slack,
-        own_high + slack, slack, depths);
+    store_surfaces(place + ivec2(SHAFT_PLANES + 2u, 0), light, base, some, box_frame, own_low - own_slack,
+        own_high + own_slack, slack, depths);
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 8u, 0), vec4(normal_low, some.y));
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 9u, 0), vec4(normal_high, some.z));
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
@@ -325,3 +286,67 @@ void main() {
     imageStore(part_list, tile_entry_place(slot, tiles), uvec4(part.y * tiles.x + part.x));
 }
 
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= arguments.count) {
+        return;
+    }
+    uvec2 size = params.counts.xy;
+    uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
+    uvec2 tile = tile_of_entry(texelFetch(list, tile_entry_place(index, tiles), 0).x, tiles);
+    Light light = view.light;
+    vec3 eye = view.camera.eye.xyz;
+
+    // The gap in the middle of the depths of surfaces that are not turned away, if there is room for one.
+    ivec2 bounds_place = ivec2(tile.x * TILE_TEXELS, tile.y);
+    TileBounds bounds = tile_bounds_of(texelFetch(tile_bounds, bounds_place, 0),
+        texelFetch(tile_bounds, bounds_place + ivec2(1, 0), 0), texelFetch(tile_bounds, bounds_place + ivec2(2, 0), 0));
+    float width = bounds.nearest * float(TILE_SIZE) * length(view.camera.pixel_right.xyz);
+    bool is_deep = bounds.farthest - bounds.nearest > width || !bounds.all_hit;
+    uint looks = is_deep && !bounds.one_triangle ? TILE_SIZE * TILE_SIZE : 0u;
+    // Normals are looked at where some of them may be turned away.
+    vec3 near_light = light_offset(light, eye + bounds.farthest * pixel_ray(view.camera, tile * TILE_SIZE));
+    bool turns = MOST_PARTS > 1u && -most_along(bounds.normal_low, bounds.normal_high, -near_light) < 0.0;
+    uint normal_looks = turns ? looks : 0u;
+    float nearest = turns ? FAR : bounds.nearest;
+    float farthest = turns ? 0.0 : bounds.farthest;
+    uvec2 seen = uvec2(turns ? 0u : ~0u);
+    for (uint i = 0u; i < normal_looks; ++i) {
+        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
+        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        vec3 ray = pixel_ray(view.camera, pixel);
+        bool counts = depth > 0.0
+            && !is_turned_away(light, eye + depth * ray, fetch_normal(texelFetch(ids, ivec2(pixel), 0).x, ray));
+        nearest = counts ? min(nearest, depth) : nearest;
+        farthest = counts ? max(farthest, depth) : farthest;
+        uint bit = counts ? 1u << (i & 31u) : 0u;
+        seen |= i < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
+    }
+    float middle = 0.5 * nearest + 0.5 * farthest;
+    float before_gap = 0.0;
+    float after_gap = FAR;
+    uvec2 at_near = tile * TILE_SIZE;
+    uvec2 at_far = tile * TILE_SIZE;
+    for (uint i = 0u; i < looks; ++i) {
+        uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
+        bool counts = ((i < 32u ? seen.x : seen.y) >> (i & 31u) & 1u) != 0u;
+        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        counts = counts && depth > 0.0;
+        depth = counts ? depth : -1.0;
+        at_near = depth < middle && depth > before_gap ? pixel : at_near;
+        before_gap = depth < middle ? max(before_gap, depth) : before_gap;
+        after_gap = counts && depth >= middle ? min(after_gap, depth) : after_gap;
+        at_far = depth == farthest ? pixel : at_far;
+    }
+    float gap = after_gap - before_gap;
+    bool both = before_gap > 0.0 && after_gap < FAR;
+    bool split = MOST_PARTS > 1u && both && gap > width && gap > LEAST_GAP * (farthest - nearest);
+    bool behind = false;
+    bool again;
+    do {
+        vec2 depths = behind ? vec2(after_gap, FAR) : vec2(0.0, split ? after_gap : FAR);
+        store_shaft(light, tile, tiles, bounds, depths, split && !behind ? at_near : at_far, behind);
+        again = split && !behind;
+        behind = true;
+    } while (again);
+}

@@ -21,17 +21,18 @@ pub fn tile_counts(size: [u32; 2]) -> [u32; 2] {
 
 /// Declares the pass that bounds the surfaces of each tile; returns an RGBA32F image of three
 /// texels a tile, side by side: nearest and farthest view depth in metres (farthest 0 where nothing
-/// was hit) and whether all pixels hit something; lowest and highest coordinates of the geometric
-/// normals.
+/// was hit) and whether all pixels hit something; lowest coordinates of the geometric normals, and whether
+/// all pixels show one triangle; highest coordinates of the normals.
 pub fn add_tile_bounds(graph: &mut Graph<'_>, gbuffer: &GBuffer, size: [u32; 2]) -> ImageId {
     let [across, down] = tile_counts(size);
     let format = vk::Format::R32G32B32A32_SFLOAT;
     let desc = ImageDesc::new(format, across * TILE_TEXELS, down);
     let bounds = graph.create_image("gbuffer.tile_bounds", desc);
     let mut pass = graph.pass("gbuffer.tiles", PassKind::Compute);
-    let (depth, normal) = (gbuffer.view_depth, gbuffer.geometric_normal);
-    pass.read(depth, Access::Sampled(Stage::Compute));
-    pass.read(normal, Access::Sampled(Stage::Compute));
+    let (depth, normal, ids) = (gbuffer.view_depth, gbuffer.geometric_normal, gbuffer.ids);
+    for image in [depth, normal, ids] {
+        pass.read(image, Access::Sampled(Stage::Compute));
+    }
     let bounds = pass.overwrite(bounds, Access::StorageWrite(Stage::Compute));
     pass.record(move |ctx| {
         let shader = &spirv::GBUFFER_TILES_COMP;
@@ -40,6 +41,7 @@ pub fn add_tile_bounds(graph: &mut Graph<'_>, gbuffer: &GBuffer, size: [u32; 2])
             Bind::sampled(0, depth, nearest),
             Bind::sampled(1, normal, nearest),
             Bind::storage_image(2, bounds),
+            Bind::sampled(3, ids, nearest),
         ];
         ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
         ctx.dispatch(shader.groups([across * down, 1, 1]));

@@ -12,7 +12,7 @@ use bytemuck::{Pod, Zeroable};
 pub(super) struct Receivers {
     /// Tiles with surfaces that some of the light is above.
     pub list: TileList,
-    /// R32F: done outside of the listed tiles.
+    /// R32F: done outside of the listed tiles, 1 in them.
     pub visibility: ImageId,
 }
 
@@ -50,20 +50,23 @@ pub(super) fn add_receivers_in(
     let size = inputs.camera.size();
     let [width, height] = size;
     let mut list = TileList::create(graph, &format!("{technique}.tiles {name}"), size);
-    let mut pass = graph.pass(format!("{technique}.start {name}"), PassKind::Transfer);
-    list.clear(&mut pass);
-    let cleared = list;
-    pass.record(move |ctx| cleared.record_clear(ctx));
-
     let desc = ImageDesc::new(vk::Format::R32_SFLOAT, width, height);
     let visibility = graph.create_image(image, desc);
+    let mut pass = graph.pass(format!("{technique}.start {name}"), PassKind::Transfer);
+    list.clear(&mut pass);
+    let visibility = pass.overwrite(visibility, Access::Clear);
+    let cleared = list;
+    pass.record(move |ctx| {
+        cleared.record_clear(ctx)?;
+        ctx.clear_image(visibility, [1.0; 4])
+    });
     let tile_bounds = inputs.tile_bounds;
     let (params, part) = inputs.view_params;
     let mut pass = graph.pass(format!("{technique}.tiles {name}"), PassKind::Compute);
     pass.read_part(params, part, Access::Uniform(Stage::Compute));
     pass.read(tile_bounds, Access::Sampled(Stage::Compute));
     list.fill(&mut pass);
-    let visibility = pass.overwrite(visibility, Access::StorageWrite(Stage::Compute));
+    let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
     pass.record(move |ctx| {
         let shader = &spirv::SHADOW_TILES_COMP;
         let bindings = [

@@ -41,16 +41,83 @@ impl Making {
         parts: TileList,
         visibility: ImageId,
     ) -> (Lists, Made) {
-        let (candidates, made) = self.add_candidates(graph, inputs, parts, visibility);
+        let made = Made {
+            visibility,
+            estimates: self.estimates,
+        };
+        let (rest, made) = self.add_settled(graph, inputs, parts, made);
+        let (candidates, made) = self.add_candidates(graph, inputs, rest, made);
         self.add_entries(graph, inputs, candidates, made)
+    }
+
+    /// Declares the passes that settle tiles by a short walk; returns the list of the others.
+    fn add_settled(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        parts: TileList,
+        made: Made,
+    ) -> (TileList, Made) {
+        let name = &inputs.light_name;
+        let [across, down] = tile_counts(inputs.camera.size());
+        let (params, shafts) = (self.params, self.shafts);
+        let mut rest = part_list(graph, inputs, "rest");
+        let mut pass = graph.pass(format!("{NAME}.no_rest {name}"), PassKind::Transfer);
+        rest.clear(&mut pass);
+        let cleared = rest;
+        pass.record(move |ctx| cleared.record_clear(ctx));
+        let (hierarchy, triangles) = (inputs.ids.hierarchy, inputs.ids.triangles);
+        let view_depth = inputs.gbuffer.view_depth;
+        let (view_params, part) = inputs.view_params;
+        let shape = shape_number(&inputs.light.shape);
+        let mut pass = graph.pass(format!("{NAME}.settle {name}"), PassKind::Compute);
+        pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+        pass.read(params, Access::Uniform(Stage::Compute));
+        for image in [hierarchy, triangles, shafts, view_depth] {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+        parts.read(&mut pass);
+        rest.fill(&mut pass);
+        let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
+        let estimates = pass.write(made.estimates, Access::StorageWrite(Stage::Compute));
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let bindings = [
+                Bind::uniform(0, view_params).part(part),
+                Bind::uniform(1, params),
+                Bind::sampled(2, hierarchy, nearest),
+                Bind::uniform(3, parts.arguments),
+                Bind::sampled(4, parts.tiles, nearest),
+                Bind::sampled(5, shafts, nearest),
+                Bind::sampled(6, triangles, nearest),
+                Bind::storage_image(7, visibility),
+                Bind::sampled(8, view_depth, nearest),
+                Bind::storage_image(9, estimates),
+                Bind::storage_buffer(10, rest.arguments),
+                Bind::storage_image(11, rest.tiles),
+            ];
+            let shader = &spirv::SHAFT_MASKS_SETTLE_COMP;
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(0, shape)],
+                ..ComputePipelineDesc::new(shader)
+            };
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            ctx.dispatch(shader.groups([across * down * PARTS, 1, 1]));
+            Ok(())
+        });
+        let made = Made {
+            visibility,
+            estimates,
+        };
+        (rest, made)
     }
 
     fn add_candidates(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        parts: TileList,
-        visibility: ImageId,
+        rest: TileList,
+        made: Made,
     ) -> (Candidates, Made) {
         let name = &inputs.light_name;
         let size = inputs.camera.size();
@@ -95,40 +162,36 @@ impl Making {
         let desc = ImageDesc::new(format, across * LIST_TEXELS, down * PARTS);
         let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
         let (hierarchy, triangles) = (inputs.ids.hierarchy, inputs.ids.triangles);
-        let view_depth = inputs.gbuffer.view_depth;
         let (view_params, part) = inputs.view_params;
         let shape = shape_number(&inputs.light.shape);
         let mut pass = graph.pass(format!("{NAME}.lists {name}"), PassKind::Compute);
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
-        for image in [hierarchy, triangles, shafts, view_depth] {
+        for image in [hierarchy, triangles, shafts] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
-        parts.read(&mut pass);
+        rest.read(&mut pass);
         penumbra.fill(&mut pass);
         let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
         let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
         let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
-        let visibility = pass.write(visibility, Access::StorageWrite(Stage::Compute));
-        let estimates = pass.write(self.estimates, Access::StorageWrite(Stage::Compute));
+        let estimates = pass.write(made.estimates, Access::StorageWrite(Stage::Compute));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
                 Bind::sampled(2, hierarchy, nearest),
-                Bind::uniform(3, parts.arguments),
-                Bind::sampled(4, parts.tiles, nearest),
+                Bind::uniform(3, rest.arguments),
+                Bind::sampled(4, rest.tiles, nearest),
                 Bind::sampled(5, shafts, nearest),
-                Bind::storage_buffer(6, penumbra.arguments),
-                Bind::storage_image(7, penumbra.tiles),
-                Bind::storage_buffer(8, used),
-                Bind::storage_image(9, pool),
-                Bind::storage_image(10, lists),
-                Bind::storage_image(11, visibility),
-                Bind::sampled(12, view_depth, nearest),
-                Bind::storage_image(13, estimates),
-                Bind::sampled(14, triangles, nearest),
+                Bind::sampled(6, triangles, nearest),
+                Bind::storage_buffer(7, penumbra.arguments),
+                Bind::storage_image(8, penumbra.tiles),
+                Bind::storage_buffer(9, used),
+                Bind::storage_image(10, pool),
+                Bind::storage_image(11, lists),
+                Bind::storage_image(12, estimates),
             ];
             let shader = &spirv::SHAFT_MASKS_LISTS_COMP;
             let pipeline = ComputePipelineDesc {
@@ -149,11 +212,7 @@ impl Making {
             pieces,
             open,
         };
-        let made = Made {
-            visibility,
-            estimates,
-        };
-        (candidates, made)
+        (candidates, Made { estimates, ..made })
     }
 
     fn add_entries(

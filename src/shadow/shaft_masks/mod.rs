@@ -16,7 +16,8 @@
 //! | `params` | rows of samples |
 //! | `start`, `tiles` | the picture's tiles that some of the light is above |
 //! | `shafts` | the tiles, in two parts where they span a gap in depth; their shafts, and boxes around their surfaces |
-//! | `lists` | lit tiles settled; candidates of the others |
+//! | `no_rest`, `settle` | lit and dark tiles settled, as far as a short walk tells |
+//! | `lists` | more lit tiles settled; candidates of the others |
 //! | `entries` | more lit tiles and dark ones settled; edges and triangles of the others |
 //! | `masks` | visibility of the others, or what the beginnings of long lists hide |
 //! | `further` | what the rest of long lists hides |
@@ -318,7 +319,7 @@ pub(super) fn add_shafts(
             ..ComputePipelineDesc::new(shader)
         };
         ctx.bind_compute(&pipeline, &bindings, &[])?;
-        ctx.dispatch(shader.groups([across * down, most_parts, 1]));
+        ctx.dispatch(shader.groups([across * down, 1, 1]));
         Ok(())
     });
     (shafts, parts)

@@ -57,8 +57,8 @@ float pixel_visibility(uvec2 pixel) {
     vec3 n = unpack_unit(texelFetch(geometric_normal, ivec2(pixel), 0).x);
     vec3 p = params.camera.eye.xyz + depth * pixel_ray(params.camera, pixel);
     bool hit = depth > 0.0;
-    // Asking the pixel too changes nothing, but a branch on a uniform alone makes Mesa 22.3's software driver compile
-    // the shader anew for every dispatch, and keep what it compiled as long as the pipeline.
+    // Asking the pixel too changes nothing, but for a branch on a uniform alone Mesa 22.3's software driver makes a
+    // copy of the shader at every dispatch, and keeps it as long as the pipeline.
     bool sun = hit && params.light.w == 0.0;
     vec3 to_light = sun ? params.light.xyz : params.light.xyz - p;
     vec3 q = sun ? p : -to_light;

@@ -31,7 +31,7 @@ help:
 	@echo "make slurm-test  32 tasks of a real Slurm on this machine against one process; needs root"
 	@echo "make cluster-check  the Kubernetes manifest against its schema"
 	@echo "make soak        10,000 frames in one process, a quarter of an hour"
-	@echo "make faults      every call of the driver and every allocation of a frame fails once, an hour"
+	@echo "make faults      of each technique: calls from each place in the code and every allocation fail once, an hour"
 	@echo "make clean-deps  remove what set-up unpacked into .deps/"
 
 demo:

@@ -40,7 +40,8 @@ ivec2 tile_entry_place(uint index, uvec2 tiles) {
 
 // The entry of a list that a workgroup takes, of so many: 16 workgroups in a row take entries from all over the list.
 // Neighbours in a list are neighbours in the picture, and what they take differs a hundredfold: a driver that gives
-// each core one part of the dispatch gives all of them the same share of work so.
+// each core one part of the dispatch gives all of them the same share of work so, also where only the first workgroups
+// have any.
 uint spread_entry(uint index, uint count) {
     uint rows = count / 16u;
     return index < 16u * rows ? index % rows * 16u + index / rows : index;

@@ -23,7 +23,7 @@ layout(set = 0, binding = 5, r32ui) uniform writeonly uimage2D rows;
 const int ROWS_AROUND = 2;
 
 void main() {
-    uint index = gl_GlobalInvocationID.x;
+    uint index = spread_entry(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (index >= arguments.count) {
         return;
     }

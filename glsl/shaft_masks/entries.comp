@@ -248,6 +248,7 @@ void main() {
     if (index >= arguments.count) {
         return;
     }
+    index = spread_entry(index, arguments.count);
     uvec2 size = params.counts.xy;
     uvec2 tiles = (size + TILE_SIZE - 1u) / TILE_SIZE;
     uint lane = gl_LocalInvocationIndex;

@@ -53,7 +53,7 @@ vec4 fetch_shaft_texel(ivec2 place) {
 }
 
 void main() {
-    uint index = gl_GlobalInvocationID.x;
+    uint index = spread_entry(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (index >= arguments.count) {
         return;
     }

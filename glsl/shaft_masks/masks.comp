@@ -158,6 +158,7 @@ void main() {
     if (index >= arguments.count) {
         return;
     }
+    index = spread_entry(index, arguments.count);
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
     uvec4 task = push.further != 0u ? texelFetch(tasks, task_place(index), 0)
         : texelFetch(list, tile_entry_place(index, tiles), 0);

@@ -287,7 +287,7 @@ void store_shaft(Light light, uvec2 tile, uvec2 tiles, TileBounds bounds, vec2 d
 }
 
 void main() {
-    uint index = gl_GlobalInvocationID.x;
+    uint index = spread_entry(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (index >= arguments.count) {
         return;
     }

@@ -28,8 +28,8 @@ use crate::light::AreaLight;
 use crate::scene::SceneCamera;
 use crate::shadow::auto::Choice;
 use crate::shadow::silhouettes::Silhouettes;
-use crate::shadow::{LightParams, ShadowInputs, ShadowMask, Technique, ViewParams};
-use glam::DVec3;
+use crate::shadow::{LightParams, ShadowInputs, ShadowMask, Technique, ViewParams, is_above_all};
+use glam::{DVec3, Vec3};
 use std::ops::Range;
 
 /// A light with the name that its passes and files get.
@@ -259,6 +259,11 @@ fn shaded<'f>(
 ) -> Frame {
     let unlit = lights.iter().map(|named| unlit(&named.light, in_view));
     let unlit: Vec<_> = unlit.collect();
+    let eye = Vec3::from_slice(&camera.eye[..3]).as_dvec3();
+    let above = lights
+        .iter()
+        .map(|named| is_above_all(&named.light, in_view, eye));
+    let above: Vec<bool> = above.collect();
     let shading = add_shading(
         graph,
         &ShadingInputs {
@@ -272,6 +277,7 @@ fn shaded<'f>(
             parts: &found.parts,
             ambient: Ambient::of(lights, scene.bounds()),
             unlit: &unlit,
+            above: &above,
         },
     );
     Frame {

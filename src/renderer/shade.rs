@@ -81,6 +81,9 @@ pub struct ShadingInputs<'a> {
     pub ambient: Ambient,
     /// For each light, why nothing in view gets any of it, if so; lights beyond the list may light all.
     pub unlit: &'a [Option<&'static str>],
+    /// For each light, whether all of it is above the plane of every surface in view; lights beyond the list
+    /// may be below some.
+    pub above: &'a [bool],
 }
 
 /// Images that shading makes, of the picture's size.
@@ -155,6 +158,9 @@ pub fn add_shading(graph: &mut Graph<'_>, inputs: &ShadingInputs<'_>) -> Shading
         let (shadow, horizon, mask) = match inputs.masks.get(index) {
             None => (NO_SHADOW, shape, gbuffer.view_depth),
             Some(mask) => match &mask.unblocked {
+                Some(_) if inputs.above.get(index) == Some(&true) => {
+                    (NO_SHADOW, shape, gbuffer.view_depth)
+                }
                 Some(shape) => (HORIZON, shape_number(shape), gbuffer.view_depth),
                 None => (MASK, shape, mask.visibility),
             },

@@ -88,14 +88,67 @@ fn aside(edge: DVec3, others: [DVec3; 2]) -> Option<DVec3> {
     rest.try_normalize()
 }
 
+/// Whether all of a light is above every surface in view, so that none hides any of it from itself: where all
+/// receivers' hulls are flat and have light and eye on one side. False where that is not certain.
+pub(crate) fn is_above_all(light: &AreaLight, receivers: &[Vec<DVec3>], eye: DVec3) -> bool {
+    receivers.iter().all(|hull| {
+        let Some((normal, offset)) = plane_of(hull) else {
+            return false;
+        };
+        let side = (normal.dot(eye) - offset).signum();
+        let clearance = light_clearance(light, side * normal, side * offset);
+        let scale = match light.shape {
+            LightShape::Sun { .. } => 1.0,
+            _ => (hull.iter())
+                .map(|p| p.distance(light.center.as_dvec3()))
+                .fold(0.0, f64::max),
+        };
+        clearance > CLEARANCE * scale
+    })
+}
+
+/// Least clearance of a light above a plane, as a part of the distance: shaders find all of it above then.
+const CLEARANCE: f64 = 1.0e-3;
+
+/// The plane that a hull lies in: its unit normal and offset. `None` for one that is not flat, or is but a line.
+fn plane_of(hull: &[DVec3]) -> Option<(DVec3, f64)> {
+    let first = *hull.first()?;
+    let largest = |from: &dyn Fn(DVec3) -> DVec3| {
+        let all = hull.iter().map(|p| from(*p - first));
+        all.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
+    };
+    let along = largest(&|p| p)?;
+    let across = largest(&|p| along.cross(p))?;
+    if across.length() <= FLAT * along.length_squared() {
+        return None;
+    }
+    let normal = across.try_normalize()?;
+    let height = |p: &DVec3| normal.dot(*p - first).abs();
+    let size = hull
+        .iter()
+        .map(|p| p.abs().max_element())
+        .fold(0.0, f64::max);
+    let flat = hull.iter().all(|p| height(p) <= ROUNDING * size);
+    flat.then(|| (normal, normal.dot(first)))
+}
+
+/// Least width of a hull that has a plane, as a part of its length.
+const FLAT: f64 = 1.0e-3;
+
 /// Whether all of a light lies where `normal` . p >= `offset`; of a sun, whether its directions do
 /// not lead back from there.
 fn light_is_beyond(light: &AreaLight, normal: DVec3, offset: f64) -> bool {
+    light_clearance(light, normal, offset) >= 0.0
+}
+
+/// How far all of a light lies beyond where `normal` . p = `offset`, metres; of a sun, by how much the sine of the
+/// angle between its directions and the plane is above 0.
+fn light_clearance(light: &AreaLight, normal: DVec3, offset: f64) -> f64 {
     let [x, y] = [light.axis_x, light.axis_y].map(|axis| normal.dot(axis.as_dvec3()));
     let reach = match light.shape {
         LightShape::Sun { angular_diameter } => {
             let towards = -light.direction.as_dvec3();
-            return normal.dot(towards) >= (0.5 * f64::from(angular_diameter)).sin();
+            return normal.dot(towards) - (0.5 * f64::from(angular_diameter)).sin();
         }
         LightShape::Rect { width, height } => {
             0.5 * (f64::from(width) * x.abs() + f64::from(height) * y.abs())
@@ -103,7 +156,7 @@ fn light_is_beyond(light: &AreaLight, normal: DVec3, offset: f64) -> bool {
         LightShape::Disk { radius } => f64::from(radius) * x.hypot(y),
         _ => f64::from(light.shape.bounding_radius()),
     };
-    normal.dot(light.center.as_dvec3()) - reach >= offset
+    normal.dot(light.center.as_dvec3()) - reach - offset
 }
 
 #[cfg(test)]
@@ -122,6 +175,43 @@ mod tests {
 
     fn light(shape: LightShape, center: [f32; 3]) -> AreaLight {
         AreaLight::new(shape, center.into(), Vec3::NEG_Y, Vec3::X)
+    }
+
+    #[test]
+    fn lights_are_above_flat_ground_alone() {
+        let disk = LightShape::Disk { radius: 0.5 };
+        let ground = hull(&boxed([-10.0, 1.0, -10.0], [10.0, 1.0, 10.0]));
+        let body = hull(&boxed([-1.0, 1.0, -1.0], [1.0, 2.0, 1.0]));
+        let above = |center, receivers: &[Vec<DVec3>], eye: [f64; 3]| {
+            is_above_all(&light(disk, center), receivers, eye.into())
+        };
+        let eye = [3.0, 5.0, 0.0];
+        assert!(above([0.0, 4.0, 0.0], std::slice::from_ref(&ground), eye));
+        assert!(!above([0.0, 1.0, 0.0], std::slice::from_ref(&ground), eye));
+        assert!(!above([0.0, -4.0, 0.0], std::slice::from_ref(&ground), eye));
+        // Seen from below.
+        assert!(!above(
+            [0.0, 4.0, 0.0],
+            std::slice::from_ref(&ground),
+            [0.0; 3]
+        ));
+        assert!(above(
+            [0.0, -4.0, 0.0],
+            std::slice::from_ref(&ground),
+            [0.0; 3]
+        ));
+        assert!(!above([0.0, 4.0, 0.0], &[ground.clone(), body], eye));
+        // A wall that the light is level with.
+        let wall = hull(&boxed([0.0, 1.0, -10.0], [0.0, 9.0, 10.0]));
+        assert!(!above([0.0, 4.0, 0.0], &[ground, wall], eye));
+        let sun = |degrees: f32| {
+            let angular_diameter = degrees.to_radians();
+            let wall = [hull(&boxed([0.0, 1.0, -10.0], [0.0, 9.0, 10.0]))];
+            let mut light = light(LightShape::Sun { angular_diameter }, [0.0; 3]);
+            light.direction = Vec3::new(-0.1, -1.0, 0.0).normalize();
+            is_above_all(&light, &wall, DVec3::X)
+        };
+        assert!(sun(2.0) && !sun(12.0));
     }
 
     #[test]

@@ -19,7 +19,7 @@ mod technique;
 mod unblocked;
 mod uniform;
 
-pub(crate) use casters::{casters, is_before};
+pub(crate) use casters::{casters, is_above_all, is_before};
 pub use light_params::{LightParams, ViewParams, shape_number};
 pub use light_view::{LightView, LightViews, light_views};
 pub use map::MAP_SIZE;

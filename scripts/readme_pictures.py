@@ -11,7 +11,7 @@ import sys
 
 # Scene, light, techniques.
 SHOWN = [
-    ("figure.glb", "disk", ["hard", "pcss", "occlusion-textures", "mdi", "ssoc", "dbuffer", "shaft-masks"]),
+    ("figure.glb", "disk", ["hard", "pcf", "pcss", "occlusion-textures", "mdi", "ssoc", "dbuffer", "shaft-masks"]),
     ("tube.gltf", "tube", ["pcss", "oess"]),
 ]
 

@@ -8,9 +8,9 @@ use antumbra::capture::{CapturedFrame, FrameRenderer, FrameRequest, plan_frame};
 use antumbra::graph::{FakeMemory, Graph, Plan};
 use antumbra::light::{AreaLight, LightShape};
 use antumbra::renderer::{NamedLight, SceneBuffers, add_frame, add_frame_without_shadows};
-use antumbra::scene::{Primitive, Scene};
+use antumbra::scene::{AlphaMode, Material, Primitive, Scene, Texture, TextureImage, Wrap};
 use antumbra::shadow::Technique;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use support::plates::{SIZE, camera, floor, plate, scene};
 use support::rig::with_renderer;
 
@@ -356,6 +356,105 @@ fn what_a_technique_cannot_do_without_is_an_error() {
         );
         assert_eq!(error.lines().count(), 1, "{error}");
         assert_eq!(graph.pass_count(), 0);
+    }
+}
+
+/// A plate with holes over a floor that could have some, and if asked for a triangle that cannot, below the floor
+/// and out of view.
+fn cut_out(shape: LightShape, with_edges: bool) -> Scene {
+    let mut parts = vec![floor(), plate("leaf", [-0.6, 0.7], [-0.5, 0.4], 5.0)];
+    // The floor shows the first texel alone, which is none of the holes.
+    parts[0].uvs = vec![Vec2::ZERO; 4];
+    parts[1].uvs = vec![Vec2::ZERO, Vec2::Y, Vec2::ONE, Vec2::X];
+    let below = plate("below", [19.9, 20.1], [-0.1, 0.1], 12.0);
+    parts.push(Primitive {
+        indices: vec![0, 1, 2],
+        ..below
+    });
+    let mut scene = scene(parts, shape);
+    for part in &mut scene.primitives[..2] {
+        part.material = 1;
+    }
+    scene.images.push(TextureImage {
+        name: "holes".to_string(),
+        width: 4,
+        height: 4,
+        texels: (0..16)
+            .map(|i| [255, 255, 255, [255, 0][i % 3 / 2]])
+            .collect(),
+    });
+    scene.materials.push(Material {
+        alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+        base_texture: Some(Texture {
+            image: 0,
+            wrap: [Wrap::Clamp; 2],
+        }),
+        ..Material::default()
+    });
+    scene.finish().unwrap();
+    if !with_edges {
+        // Views, and light from nowhere in particular, depend on the scene's size: it stays.
+        scene.primitives.truncate(2);
+    }
+    scene
+}
+
+/// Where alpha cuts out all triangles there are no edges, and nothing is made of them.
+#[test]
+fn a_scene_without_edges_has_no_passes_for_edges() {
+    let _one = support::serial();
+    let bands: &[&str] = &["silhouettes", "outlines", "bands"];
+    let second: &[&str] = &["silhouettes", "outlines", "bands", "bands_second"];
+    let lists: &[&str] = &["silhouettes", "boxes", "lists"];
+    let surfaces: &[&str] = &["map", "silhouettes", "umbra", "penumbra"];
+    let sphere = LightShape::Sphere { radius: 0.5 };
+    let sun = LightShape::Sun {
+        angular_diameter: 0.05,
+    };
+    for (options, shape, needless) in [
+        ("ssoc", DISK, bands),
+        ("ssoc", sun, bands),
+        ("ssoc:layers=2", sphere, second),
+        ("ssoc:combine=rule", DISK, bands),
+        ("dbuffer", DISK, lists),
+        ("dbuffer", sphere, lists),
+        ("dbuffer:buffer=edges,layers=3", DISK, surfaces),
+        ("dbuffer:buffer=distances", sun, surfaces),
+    ] {
+        let title = format!("{options} {shape:?}");
+        let technique = options.split(':').next().unwrap();
+        let request = request(options);
+        let [full, frame] = [true, false].map(|with_edges| {
+            let scene = cut_out(shape, with_edges);
+            with_renderer(&scene, |renderer| renderer.render(&request).unwrap())
+        });
+        assert_eq!(
+            [&full, &frame].map(|frame| frame.counters["edges"]),
+            [3, 0],
+            "{title}"
+        );
+        for name in needless {
+            let has = |frame| {
+                let passes = passes(frame, technique);
+                let mut words = passes.iter().map(|pass| pass.split('.').nth(1));
+                words.any(|word| word == Some(name))
+            };
+            assert!(has(&full) && !has(&frame), "{title}: {name}");
+            assert_reason(
+                &frame.plan,
+                &format!("{technique}.{name} "),
+                "the scene has no edges",
+            );
+        }
+        assert!(
+            full.lights[0].visibility == frame.lights[0].visibility,
+            "{title}"
+        );
+        assert!(full.color == frame.color, "{title}");
+        let dark = frame.lights[0].visibility.iter().filter(|v| **v < 0.5);
+        assert!((200..3000).contains(&dark.count()), "{title}");
+        let bytes = |frame: &CapturedFrame| frame.counters["transient_bytes"];
+        assert!(bytes(&frame) < bytes(&full), "{title}");
     }
 }
 

@@ -73,6 +73,51 @@ pub(crate) const ARGUMENTS_BYTES: u64 = 32;
 /// Edges that one invocation classifies.
 const RUN: u32 = 32;
 
+/// Number of the scene's edges.
+///
+/// # Panics
+/// If they have not been found: [`crate::geometry::SceneBuffers::add_edges`].
+pub(super) fn edge_count(inputs: &ShadowInputs<'_>) -> u32 {
+    assert!(
+        inputs.scene.has_edges(),
+        "the scene's edges are added before they are read"
+    );
+    inputs.scene.edge_count() as u32
+}
+
+/// Why nothing is made of edges: no outline is known where alpha cuts triangles out.
+const NO_EDGES: &str = "the scene has no edges";
+
+/// Notes that a technique's passes over edges are not needed, as the scene has none.
+pub(super) fn skip_edges(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    technique: &str,
+    passes: &[&str],
+) {
+    for pass in passes {
+        graph.skip(
+            format!("{technique}.{pass} {}", inputs.light_name),
+            NO_EDGES,
+        );
+    }
+}
+
+/// Stands in for an image that edges would be drawn into: a texel of zeros for each layer.
+pub(super) fn add_blank(
+    graph: &mut Graph<'_>,
+    name: String,
+    format: vk::Format,
+    layers: u32,
+) -> ImageId {
+    let desc = ImageDesc::new(format, 1, 1).layers(layers);
+    let blank = graph.create_image(name.clone(), desc);
+    let mut pass = graph.pass(name, PassKind::Transfer);
+    let blank = pass.overwrite(blank, Access::Clear);
+    pass.record(move |ctx| ctx.clear_image(blank, [0.0; 4]));
+    blank
+}
+
 /// Declares the passes, or none if the inputs bring the list of an earlier frame. `vertices` is how
 /// many the consumer draws for each edge.
 ///
@@ -91,11 +136,7 @@ pub fn add_silhouettes(
         graph.skip(format!("{technique}.silhouettes {name}"), reason);
         return kept;
     }
-    assert!(
-        inputs.scene.has_edges(),
-        "the scene's edges are added before they are read"
-    );
-    let edge_count = inputs.scene.edge_count() as u32;
+    let edge_count = edge_count(inputs);
     let runs = edge_count.div_ceil(RUN).max(1);
     let size = u64::from(runs) * 4;
     let mut buffer = |what: &str, size: u64| {

@@ -7,6 +7,7 @@
 //! | `map` | triangles that the light's centre sees, in the buffer's texels |
 //! | `silhouettes.*` | the list of edges ([`crate::shadow::silhouettes`]) |
 //! | `umbra`, `penumbra` | a layer of one surface in a view |
+//! | `no_surfaces` | if the scene has no edges, in place of these and the map: a texel without a surface |
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
 //!
@@ -23,7 +24,9 @@ use crate::graph::{
 use crate::shadow::light_view::{LightView, LightViews, MAX_LIGHT_VIEWS, light_views};
 use crate::shadow::map::{ShadowMap, add_maps};
 use crate::shadow::receivers::add_receivers;
-use crate::shadow::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
+use crate::shadow::silhouettes::{
+    SilhouetteRule, Silhouettes, add_blank, add_silhouettes, edge_count, skip_edges,
+};
 use crate::shadow::uniform::add_uniform;
 use crate::shadow::{ShadowInputs, ShadowMask, hard, shape_number};
 use ash::vk;
@@ -108,6 +111,20 @@ struct Surfaces {
     penumbra: Vec<ImageId>,
 }
 
+impl Surfaces {
+    /// Declares a texel without a surface for each view, and notes what is left out.
+    fn none(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, views: u32) -> Self {
+        let skipped = ["map", "silhouettes", "umbra", "penumbra"];
+        skip_edges(graph, inputs, NAME, &skipped);
+        let name = format!("{NAME}.no_surfaces {}", inputs.light_name);
+        let blank = add_blank(graph, name, vk::Format::R32G32_UINT, views.max(1));
+        Self {
+            umbra: vec![blank],
+            penumbra: vec![blank],
+        }
+    }
+}
+
 /// What the volumes are drawn from.
 struct Drawn<'a> {
     views: &'a LightViews,
@@ -132,9 +149,17 @@ pub(super) fn add_buffer<'f>(
         &inputs.scene.bounds(),
         0.0,
     );
-    let params = BufferParams::new(inputs, &views, options.resolution);
+    let has_edges = edge_count(inputs) > 0;
+    let side = if has_edges { options.resolution } else { 1 };
+    let params = BufferParams::new(inputs, &views, side);
     let params = add_uniform(graph, format!("{NAME}.views {name}"), params);
     let coverage = add_uniform(graph, format!("{NAME}.params {name}"), coverage);
+    let both = [coverage, params];
+    if !has_edges {
+        let surfaces = Surfaces::none(graph, inputs, views.views.len() as u32);
+        let visibility = add_visibility(graph, inputs, options, both, hard, &surfaces);
+        return ShadowMask::new(visibility);
+    }
     let target = DrawTarget::Ids;
     let map = add_maps(graph, inputs, NAME, &views, target, options.resolution);
     let ShadowMap { ids: Some(map), .. } = map else {
@@ -151,7 +176,7 @@ pub(super) fn add_buffer<'f>(
         umbra: drawn.add_surface(graph, inputs, options, true),
         penumbra: drawn.add_surface(graph, inputs, options, false),
     };
-    let visibility = add_visibility(graph, inputs, options, [coverage, params], hard, &surfaces);
+    let visibility = add_visibility(graph, inputs, options, both, hard, &surfaces);
     // The images are not kept: views of a light cover what the camera sees.
     ShadowMask {
         silhouettes: Some(list),

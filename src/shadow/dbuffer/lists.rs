@@ -7,7 +7,7 @@ use crate::graph::{
     Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
 };
 use crate::shadow::receivers::Receivers;
-use crate::shadow::silhouettes::Silhouettes;
+use crate::shadow::silhouettes::{Silhouettes, edge_count};
 use crate::shadow::{ShadowInputs, shape_number};
 use ash::vk;
 
@@ -28,7 +28,7 @@ const LEAST_TILES: u32 = 1024;
 pub(in crate::shadow) struct Sizes {
     /// Edges of the scene: the most silhouettes that there can be.
     edges: u32,
-    /// Blocks of silhouettes.
+    /// Blocks of silhouettes: none where triangles have holes and there are no edges.
     pub blocks: u32,
     /// Lists of a tile: one for each block, and one of triangles with holes if there are any.
     pub lists: u32,
@@ -38,14 +38,16 @@ pub(in crate::shadow) struct Sizes {
 
 impl Sizes {
     pub(super) fn new(inputs: &ShadowInputs<'_>, options: &DbufferOptions) -> Self {
-        let edges = inputs.scene.edge_count() as u32;
+        let edges = edge_count(inputs);
         let [across, down] = tile_counts(inputs.camera.size());
         let entries = (across * down).max(LEAST_TILES) * options.room;
-        let blocks = edges.div_ceil(GROUPS[2]).max(1);
+        let cutouts = u32::from(inputs.scene.has_masks());
+        // A tile has one list at least.
+        let blocks = edges.div_ceil(GROUPS[2]).max(1 - cutouts);
         Self {
             edges,
             blocks,
-            lists: blocks + u32::from(inputs.scene.has_masks()),
+            lists: blocks + cutouts,
             chunks: (entries / CHUNK_TEXELS).min(MOST_CHUNKS),
         }
     }
@@ -56,7 +58,8 @@ pub(in crate::shadow) struct Lists {
     /// In names of passes and images.
     pub technique: &'static str,
     pub params: BufferId,
-    pub silhouettes: Silhouettes,
+    /// `None` without blocks of them.
+    pub silhouettes: Option<Silhouettes>,
     pub receivers: Receivers,
     pub shafts: ImageId,
     /// R32F: what sees the light's centre.
@@ -65,6 +68,7 @@ pub(in crate::shadow) struct Lists {
 }
 
 /// Lists and what they are made in.
+#[derive(Clone, Copy)]
 struct Made {
     used: BufferId,
     pool: ImageId,
@@ -81,7 +85,7 @@ pub(in crate::shadow) struct Found {
     pub chunk_boxes: ImageId,
     /// RGBA32_UINT: `list_place` in `dbuffer/lists.glsl`.
     pub lists: ImageId,
-    /// RGBA32F: both ends of each silhouette, scene space, metres.
+    /// RGBA32F: both ends of each silhouette, scene space, metres. Without blocks of them nobody looks there.
     pub ends: ImageId,
     /// Tiles with edges.
     pub tiles: TileList,
@@ -100,6 +104,8 @@ impl Lists {
     /// numbers, triangles, hierarchy, edges, points, and numbers of the silhouettes.
     pub fn sampled(&self, inputs: &ShadowInputs<'_>) -> [ImageId; 7] {
         let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
+        // Something must be bound.
+        let numbers = self.silhouettes.map_or(ids.edges, |found| found.list);
         [
             gbuffer.view_depth,
             gbuffer.ids,
@@ -107,7 +113,7 @@ impl Lists {
             ids.hierarchy,
             ids.edges,
             ids.points,
-            self.silhouettes.list,
+            numbers,
         ]
     }
 
@@ -115,17 +121,23 @@ impl Lists {
     /// done.
     pub(super) fn add(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> (Found, ImageId) {
         let technique = self.technique;
-        let ends = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * self.sizes.edges);
-        let mut ends = graph.create_image(format!("{technique}.ends {}", inputs.light_name), ends);
-        let mut boxes: Vec<ImageId> = Vec::new();
-        for (level, group) in GROUPS.into_iter().enumerate() {
-            let below = level
-                .checked_sub(1)
-                .map(|below| (boxes[below], GROUPS[below]));
-            let made = self.add_boxes(graph, inputs, group, below, &mut ends);
-            boxes.push(made);
+        let mut made = self.add_pool(graph, inputs);
+        // Something must be bound.
+        let mut ends = inputs.ids.points;
+        if let Some(silhouettes) = self.silhouettes {
+            let desc = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * self.sizes.edges);
+            ends = graph.create_image(format!("{technique}.ends {}", inputs.light_name), desc);
+            let mut boxes: Vec<ImageId> = Vec::new();
+            for (level, group) in GROUPS.into_iter().enumerate() {
+                let below = level
+                    .checked_sub(1)
+                    .map(|below| (boxes[below], GROUPS[below]));
+                let found = self.add_boxes(graph, inputs, silhouettes, group, below, &mut ends);
+                boxes.push(found);
+            }
+            let boxes = [boxes[0], boxes[1], boxes[2]];
+            made = self.add_lists(graph, inputs, silhouettes, ends, boxes, made);
         }
-        let mut made = self.add_lists(graph, inputs, ends, [boxes[0], boxes[1], boxes[2]]);
         if inputs.scene.has_masks() {
             made = self.add_cutouts(graph, inputs, made);
         }
@@ -136,6 +148,7 @@ impl Lists {
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
+        silhouettes: Silhouettes,
         group: u32,
         below: Option<(ImageId, u32)>,
         ends: &mut ImageId,
@@ -145,7 +158,7 @@ impl Lists {
         let desc = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * count);
         let boxes = graph.create_image(format!("{technique}.boxes {name}.{group}"), desc);
         let (edges, points) = (inputs.ids.edges, inputs.ids.points);
-        let Silhouettes { list, arguments } = self.silhouettes;
+        let Silhouettes { list, arguments } = silhouettes;
         let (lower, size) = below.unwrap_or((points, 0));
         let mut pass = graph.pass(
             format!("{technique}.boxes {name}.{group}"),
@@ -189,13 +202,8 @@ impl Lists {
         boxes
     }
 
-    fn add_lists(
-        &self,
-        graph: &mut Graph<'_>,
-        inputs: &ShadowInputs<'_>,
-        ends: ImageId,
-        boxes: [ImageId; 3],
-    ) -> Made {
+    /// Room for the lists, with nothing in it.
+    fn add_pool(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> Made {
         let (technique, name) = (self.technique, &inputs.light_name);
         let [across, down] = tile_counts(inputs.camera.size());
         let used = graph.create_buffer(format!("{technique}.used {name}"), BufferDesc { size: 16 });
@@ -207,17 +215,36 @@ impl Lists {
         let pool = graph.create_image(format!("{technique}.pool {name}"), pool);
         let boxed = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * self.sizes.chunks);
         let chunk_boxes = graph.create_image(format!("{technique}.chunk_boxes {name}"), boxed);
-        let blocks = self.sizes.blocks;
         let desc = texels(
             vk::Format::R32G32B32A32_UINT,
             across * down * self.sizes.lists,
         );
         let lists = graph.create_image(format!("{technique}.lists {name}"), desc);
+        Made {
+            used,
+            pool,
+            chunk_boxes,
+            lists,
+        }
+    }
+
+    fn add_lists(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        silhouettes: Silhouettes,
+        ends: ImageId,
+        boxes: [ImageId; 3],
+        made: Made,
+    ) -> Made {
+        let (technique, name) = (self.technique, &inputs.light_name);
+        let [across, down] = tile_counts(inputs.camera.size());
+        let blocks = self.sizes.blocks;
         let (params, shafts, tiles) = (self.params, self.shafts, self.receivers.list);
         let Silhouettes {
             list: numbers,
             arguments,
-        } = self.silhouettes;
+        } = silhouettes;
         let (edges, points) = (inputs.ids.edges, inputs.ids.points);
         let mut pass = graph.pass(format!("{technique}.lists {name}"), PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
@@ -227,10 +254,10 @@ impl Lists {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         tiles.read(&mut pass);
-        let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
-        let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
-        let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
-        let chunk_boxes = pass.overwrite(chunk_boxes, Access::StorageWrite(Stage::Compute));
+        let used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
+        let pool = pass.overwrite(made.pool, Access::StorageWrite(Stage::Compute));
+        let lists = pass.overwrite(made.lists, Access::StorageWrite(Stage::Compute));
+        let chunk_boxes = pass.overwrite(made.chunk_boxes, Access::StorageWrite(Stage::Compute));
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -277,9 +304,15 @@ impl Lists {
         }
         tiles.read(&mut pass);
         let used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
-        let pool = pass.write(made.pool, Access::StorageWrite(Stage::Compute));
-        let lists = pass.write(made.lists, Access::StorageWrite(Stage::Compute));
-        let chunk_boxes = pass.write(made.chunk_boxes, Access::StorageWrite(Stage::Compute));
+        let images = [made.pool, made.lists, made.chunk_boxes];
+        let [pool, lists, chunk_boxes] = images.map(|image| {
+            let written = Access::StorageWrite(Stage::Compute);
+            // Lists of silhouettes come before, if there are any.
+            match self.silhouettes {
+                Some(_) => pass.write(image, written),
+                None => pass.overwrite(image, written),
+            }
+        });
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [

@@ -14,7 +14,7 @@
 //! |---|---|
 //! | `params` | places on the light |
 //! | `map`, `visibility` of `dbuffer.hard` | what sees the light's centre |
-//! | `silhouettes.*` | the list of edges ([`super::silhouettes`]), kept while light and casters stand still |
+//! | `silhouettes.*` | the list of edges ([`super::silhouettes`]), kept while light and casters stand still; like `boxes` and `lists` only if the scene has edges |
 //! | `boxes` | the ends of edges, boxes around 16, 256 and 4096 of them |
 //! | `start`, `tiles`, `shafts` | tiles that some of the light is above, what is between both |
 //! | `lists` | the edges of each tile, in chunks with boxes around them |
@@ -32,7 +32,7 @@ pub use options::{Buffer, Curve, DbufferOptions, Keep};
 
 use super::receivers::add_receivers;
 use super::shaft_masks::add_shafts;
-use super::silhouettes::{SilhouetteRule, add_silhouettes};
+use super::silhouettes::{SilhouetteRule, add_silhouettes, skip_edges};
 use super::uniform::add_uniform;
 use super::{LightParams, ShadowInputs, ShadowMask, ViewParams, casters, hard, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
@@ -114,7 +114,13 @@ pub(super) fn add_edge_lists(
     };
     let name = format!("{technique}.params {}", inputs.light_name);
     let params = add_uniform(graph, name, params);
-    let silhouettes = add_silhouettes(graph, inputs, technique, SilhouetteRule::Layers, 1);
+    let silhouettes = if sizes.blocks > 0 {
+        let rule = SilhouetteRule::Layers;
+        Some(add_silhouettes(graph, inputs, technique, rule, 1))
+    } else {
+        skip_edges(graph, inputs, technique, &["silhouettes", "boxes", "lists"]);
+        None
+    };
     let receivers = add_receivers(graph, inputs, technique, shape.reach());
     let (shafts, _) = add_shafts(graph, inputs, (technique, 1), params, &receivers);
     let tools = Lists {
@@ -234,7 +240,7 @@ fn add_visibility<'f>(
         tiles.dispatch(ctx)
     });
     ShadowMask {
-        silhouettes: Some(tools.silhouettes),
+        silhouettes: tools.silhouettes,
         ..ShadowMask::new(visibility)
     }
 }

@@ -29,7 +29,10 @@ pub(super) fn add_passes<'f>(
         ..DbufferOptions::DEFAULT
     };
     let (tools, found, visibility) = dbuffer::add_edge_lists(graph, inputs, NAME, &options, hard);
-    let turns = add_turns(graph, inputs, &tools.silhouettes, found.ends);
+    let Some(silhouettes) = tools.silhouettes else {
+        unreachable!("only beside triangles with holes may no edges be listed");
+    };
+    let turns = add_turns(graph, inputs, &silhouettes, found.ends);
     let line = add_uniform(graph, format!("{NAME}.line {name}"), line);
     let (view_params, part) = inputs.view_params;
     let (params, tiles) = (tools.params, found.tiles);
@@ -71,7 +74,7 @@ pub(super) fn add_passes<'f>(
         tiles.dispatch(ctx)
     });
     ShadowMask {
-        silhouettes: Some(tools.silhouettes),
+        silhouettes: tools.silhouettes,
         ..ShadowMask::new(visibility)
     }
 }

@@ -27,6 +27,7 @@
 //! | `outlines` | where along each edge it is an outline |
 //! | `bands` | the outer and the inner distortion map of a view |
 //! | `bands_second` | with `layers=2`: what another edge was before there |
+//! | `no_bands` | if the scene has no edges, in place of these four: maps of a texel without an edge |
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
 //! | `collisions`, `crowding` | how many bands share texels, if anyone wants the counts |
@@ -42,7 +43,9 @@ use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views, note_left_out};
 use super::map::{ShadowMap, add_maps_of};
 use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
-use super::silhouettes::{SilhouetteRule, Silhouettes, add_silhouettes};
+use super::silhouettes::{
+    SilhouetteRule, Silhouettes, add_blank, add_silhouettes, edge_count, skip_edges,
+};
 use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, shape_number};
 use crate::geometry::{DrawTarget, image_place};
@@ -120,9 +123,11 @@ pub(super) fn add_passes<'f>(
     let views = light_views(&light, &inputs.receivers, &casters, margin);
     note_left_out(graph, inputs, NAME, &views);
     let [width, height] = inputs.camera.size();
+    let has_edges = edge_count(inputs) > 0;
+    let side = if has_edges { options.bands } else { 1 };
     let mut params = SsocParams {
         counts: [views.views.len() as u32, options.resolution, width, height],
-        bands: [options.bands, 0, 0, 0],
+        bands: [side, 0, 0, 0],
         reach: [reach, far, far * NEAR, LEAST_TEXELS],
         ..SsocParams::default()
     };
@@ -152,8 +157,13 @@ pub(super) fn add_passes<'f>(
         unreachable!("triangle numbers were asked for");
     };
     let map = (depth, ids);
-    let list = add_silhouettes(graph, inputs, NAME, SilhouetteRule::Center, VERTICES);
     let layers = views.views.len() as u32;
+    if !has_edges {
+        let blank = add_no_bands(graph, inputs, &options, layers);
+        let bands = (blank, blank);
+        return ShadowMask::new(add_visibility(graph, inputs, &options, buffer, map, bands));
+    }
+    let list = add_silhouettes(graph, inputs, NAME, SilhouetteRule::Center, VERTICES);
     let outlines = add_outlines(graph, inputs, layers, buffer, map, list);
     let drawing = Bands {
         side: if layers == 0 { 1 } else { options.bands },
@@ -236,6 +246,21 @@ fn add_outlines(
         list.dispatch(ctx)
     });
     outlines
+}
+
+/// Declares distortion maps of a texel without an edge, and notes what is left out.
+fn add_no_bands(
+    graph: &mut Graph<'_>,
+    inputs: &ShadowInputs<'_>,
+    options: &SsocOptions,
+    views: u32,
+) -> ImageId {
+    skip_edges(graph, inputs, NAME, &["silhouettes", "outlines", "bands"]);
+    if options.layers > 1 {
+        skip_edges(graph, inputs, NAME, &["bands_second"]);
+    }
+    let name = format!("{NAME}.no_bands {}", inputs.light_name);
+    add_blank(graph, name, vk::Format::R32_UINT, 2 * views.max(1))
 }
 
 /// What bands are drawn of, and where to.

@@ -1,4 +1,4 @@
-.PHONY: help demo test bench bench-check pictures bench-plan bench-batch figures study studies table wgpu-host slurm-test cluster-check soak faults clean-deps
+.PHONY: help demo test bench bench-check pictures bench-plan bench-batch figures study studies table wgpu-host slurm-test cluster-check soak faults semver clean-deps
 
 # For make bench: scenes, what is held against each other, picture size, and where it goes.
 SCENES ?= assets
@@ -8,6 +8,8 @@ OUT ?= out/bench
 # For make study: name of a file in benches/studies/, and further options such as --repeat 3.
 STUDY ?= occlusion-textures
 STUDY_OPTIONS ?= --resume
+# For make semver: what the library's interface is held against.
+BASELINE ?= $$(git describe --tags --abbrev=0)
 # The strongest ray tracer, where its library is: asked by the shell, after set-up may have installed it.
 EMBREE = $$([ -f /usr/include/embree3/rtcore.h ] || [ -f /usr/local/include/embree3/rtcore.h ] && echo --features embree)
 
@@ -32,6 +34,7 @@ help:
 	@echo "make cluster-check  the Kubernetes manifest against its schema"
 	@echo "make soak        10,000 frames in one process, a quarter of an hour"
 	@echo "make faults      of each technique: calls from each place in the code and every allocation fail once, an hour"
+	@echo "make semver      what breaks callers since the last tag, or since BASELINE=commit"
 	@echo "make clean-deps  remove what set-up unpacked into .deps/"
 
 demo:
@@ -106,6 +109,11 @@ soak:
 faults:
 	scripts/setup.sh test
 	cargo test --test capture_faults -- --ignored --nocapture
+
+# Needs cargo-semver-checks. Fails if callers would break and the version does not say so.
+semver:
+	scripts/setup.sh demo
+	cargo semver-checks --baseline-rev "$(BASELINE)"
 
 clean-deps:
 	rm -rf .deps

@@ -9,6 +9,7 @@ use thiserror::Error;
 /// An error of the GPU layer. Every message is one line and names the object and, where there is
 /// one, the remedy.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum GpuError {
     /// The Vulkan loader library is missing or broken.
     #[error(

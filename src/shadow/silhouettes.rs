@@ -22,6 +22,7 @@ use ash::vk;
 /// From where an edge must be seen as a silhouette: all its faces on one side of the plane through
 /// the edge and that point. Open edges always are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SilhouetteRule {
     /// From the light's centre.
     Center,

@@ -65,14 +65,17 @@ const float ROUNDING = 1.0e-6;
 struct SurfaceBox {
     vec3 center;
     mat3 half_axes;
+    float reach_m; // from the centre, at most
 };
 
 SurfaceBox fetch_surface_box(uvec2 tile) {
     ivec2 place = ivec2(tile.x * SHAFT_TEXELS + SHAFT_PLANES + 2u, tile.y);
     SurfaceBox box;
     box.center = fetch_shaft_texel(place).xyz;
+    box.reach_m = 0.0;
     for (int i = 0; i < 3; ++i) {
         box.half_axes[i] = fetch_shaft_texel(place + ivec2(i + 1, 0)).xyz;
+        box.reach_m += length(box.half_axes[i]);
     }
     return box;
 }
@@ -84,8 +87,7 @@ float side_of_box(SurfaceBox box, vec3 a, vec3 along, uint corner) {
     vec3 from = box.center - a;
     vec3 reach = abs(n * box.half_axes);
     float extent = reach.x + reach.y + reach.z;
-    float size = length(from) + length(box.half_axes[0]) + length(box.half_axes[1]) + length(box.half_axes[2]);
-    float slack = ROUNDING * length(along) * length(across) * size;
+    float slack = ROUNDING * length(along) * length(across) * (length(from) + box.reach_m);
     float height = dot(n, from);
     return height > extent + slack ? 1.0 : (height < -extent - slack ? -1.0 : 0.0);
 }
@@ -157,13 +159,24 @@ void main() {
             wanted |= shaft_meets_triangle(shaft, a, b, b) ? 1u << (at - first) : 0u;
             at += 1u;
         }
+        uint listed = 0u;
+        vec3 group_low = vec3(1.0e38);
+        vec3 group_high = vec3(-1.0e38);
         while (wanted != 0u) {
-            uint entry = first + uint(findLSB(wanted));
+            uint bit = uint(findLSB(wanted));
             wanted &= wanted - 1u;
-            vec3 a = texelFetch(ends, triangle_texel_place(2u * entry), 0).xyz;
-            vec3 b = texelFetch(ends, triangle_texel_place(2u * entry + 1u), 0).xyz;
-            bool listed = may_be_silhouette(box, entry, a, b);
-            if (listed && slot == CHUNK) {
+            vec3 a = texelFetch(ends, triangle_texel_place(2u * (first + bit)), 0).xyz;
+            vec3 b = texelFetch(ends, triangle_texel_place(2u * (first + bit) + 1u), 0).xyz;
+            if (may_be_silhouette(box, first + bit, a, b)) {
+                listed |= 1u << bit;
+                group_low = min(group_low, min(a, b));
+                group_high = max(group_high, max(a, b));
+            }
+        }
+        // Into the list's last chunk until it is full, and what is left into a fresh one. Chunks that share a group both
+        // have all of it in their boxes.
+        while (listed != 0u) {
+            if (slot == CHUNK) {
                 if (count > 0u) {
                     imageStore(chunk_boxes, triangle_texel_place(2u * chunk), vec4(low, 0.0));
                     imageStore(chunk_boxes, triangle_texel_place(2u * chunk + 1u), vec4(high, 0.0));
@@ -172,9 +185,8 @@ void main() {
                 high = vec3(-1.0e38);
                 uint fresh = atomicAdd(chunks_used, 1u);
                 if (fresh >= params.counts.w) {
-                    resume = entry;
-                    listed = false;
-                    wanted = 0u;
+                    resume = first + uint(findLSB(listed));
+                    listed = 0u;
                     at = end;
                 } else if (count == 0u) {
                     first_chunk = fresh;
@@ -184,10 +196,11 @@ void main() {
                 chunk = fresh;
                 slot = 0u;
             }
-            if (listed) {
-                imageStore(pool, chunk_entry_place(chunk, slot), uvec4(entry));
-                low = min(low, min(a, b));
-                high = max(high, max(a, b));
+            low = min(low, group_low);
+            high = max(high, group_high);
+            while (listed != 0u && slot < CHUNK) {
+                imageStore(pool, chunk_entry_place(chunk, slot), uvec4(first + uint(findLSB(listed))));
+                listed &= listed - 1u;
                 slot += 1u;
                 count += 1u;
             }

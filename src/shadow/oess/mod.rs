@@ -14,6 +14,7 @@
 //! | `map`, `visibility` of `oess.hard` | what sees the line's centre |
 //! | `silhouettes.*`, `boxes`, `start`, `tiles`, `shafts`, `lists`, `through`, `settle` | the edges of each tile: [`super::dbuffer`] |
 //! | `turns` | where edges lie around the line |
+//! | `spans` | which turn around it each edge of a tile's list takes up |
 //! | `visibility` | visibility of tiles with edges |
 //!
 //! With the option `outreach=hull`, and where triangles have holes, edges come from maps of the ends. The edge of a
@@ -118,7 +119,9 @@ pub(super) fn add_passes<'f>(
     if length <= SHORTEST * farthest_receiver(inputs) || inputs.scene.triangle_count() == 0 {
         return hard::add_passes_at(graph, inputs, options.resolution.unwrap_or(MAP_SIZE));
     }
-    if options.outreach == Outreach::Silhouettes && !inputs.scene.has_masks() {
+    let scene = inputs.scene;
+    let has_edges = scene.edge_count() > 0 && !scene.has_masks();
+    if options.outreach == Outreach::Silhouettes && has_edges {
         let texels = options.resolution.unwrap_or(MAP_SIZE);
         let line = LineParams::new(&inputs.light, length);
         return silhouettes::add_passes(graph, inputs, line, texels);

@@ -458,6 +458,27 @@ fn a_scene_without_edges_has_no_passes_for_edges() {
     }
 }
 
+/// A point has no penumbra, and beside triangles with holes the edges of a line come from maps: no edge is looked for.
+#[test]
+fn edges_that_nobody_reads_are_not_found() {
+    let _one = support::serial();
+    let line = LightShape::Line { length: 1.0 };
+    for (technique, shape) in [("ssoc", LightShape::Point), ("oess", line)] {
+        let scene = cut_out(shape, true);
+        let frame = with_renderer(&scene, |r| r.render(&request(technique)).unwrap());
+        assert!(!frame.counters.contains_key("edges"), "{technique}");
+        for pass in passes(&frame, technique) {
+            assert!(!pass.contains("silhouettes"), "{technique}: {pass}");
+            assert!(!pass.contains(".bands"), "{technique}: {pass}");
+        }
+        let dark = frame.lights[0].visibility.iter().filter(|v| **v < 0.5);
+        assert!((200..3000).contains(&dark.count()), "{technique}");
+        if technique == "ssoc" {
+            assert_reason(&frame.plan, "ssoc.bands ", "a point has no penumbra");
+        }
+    }
+}
+
 /// A frame in which nothing casts a shadow has the passes and the memory of one with shadows off, with any number
 /// of lights, and the picture of one whose technique found that nothing hides anything.
 #[test]

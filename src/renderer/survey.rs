@@ -40,6 +40,8 @@ pub struct Survey {
     /// Of each light, and each of the scene's draws.
     pub(super) casters: Vec<Rc<[bool]>>,
     choices: Vec<Choice>,
+    /// Of each light: whether its technique reads edges.
+    reads_edges: Vec<bool>,
 }
 
 impl Survey {
@@ -72,10 +74,17 @@ impl Survey {
             }
             technique => vec![Choice::asked(technique); lights.len()],
         };
+        let has_masks = scene.has_masks();
+        let reads = |(choice, named): (&Choice, &NamedLight)| {
+            let shape = named.light.shape.kind();
+            choice.technique.reads_edges_of(shape, has_masks)
+        };
+        let reads_edges = choices.iter().zip(lights).map(reads).collect();
         Ok(Self {
             receivers,
             casters,
             choices,
+            reads_edges,
         })
     }
 
@@ -87,8 +96,7 @@ impl Survey {
     /// Whether the frame reads the scene's edges ([`SceneBuffers::add_edges`]). Those of
     /// [`Technique::Auto`] depend on its choices.
     pub fn reads_edges(&self) -> bool {
-        let mut choices = self.choices.iter();
-        choices.any(|choice| choice.technique.reads_edges())
+        self.reads_edges.contains(&true)
     }
 
     /// Refuses techniques that read edges of a scene without.
@@ -97,10 +105,10 @@ impl Survey {
         scene: &SceneBuffers,
         lights: &[NamedLight],
     ) -> Result<(), ShadowError> {
-        let mut both = self.choices.iter().zip(lights);
-        let reads = both.find(|(choice, _)| choice.technique.reads_edges());
-        match reads {
-            Some((choice, named)) if !scene.has_edges() => Err(ShadowError::NoEdges {
+        let both = self.choices.iter().zip(lights);
+        let mut reading = both.zip(&self.reads_edges).filter(|(_, reads)| **reads);
+        match reading.next() {
+            Some(((choice, named), _)) if !scene.has_edges() => Err(ShadowError::NoEdges {
                 light: named.name.clone(),
                 technique: choice.technique.name(),
             }),

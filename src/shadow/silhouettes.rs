@@ -87,20 +87,18 @@ pub(super) fn edge_count(inputs: &ShadowInputs<'_>) -> u32 {
 }
 
 /// Why nothing is made of edges: no outline is known where alpha cuts triangles out.
-const NO_EDGES: &str = "the scene has no edges";
+pub(super) const NO_EDGES: &str = "the scene has no edges";
 
-/// Notes that a technique's passes over edges are not needed, as the scene has none.
+/// Notes that a technique's passes over edges are not needed, and why.
 pub(super) fn skip_edges(
     graph: &mut Graph<'_>,
     inputs: &ShadowInputs<'_>,
     technique: &str,
     passes: &[&str],
+    reason: &str,
 ) {
     for pass in passes {
-        graph.skip(
-            format!("{technique}.{pass} {}", inputs.light_name),
-            NO_EDGES,
-        );
+        graph.skip(format!("{technique}.{pass} {}", inputs.light_name), reason);
     }
 }
 

@@ -404,6 +404,18 @@ impl Technique {
         }
     }
 
+    /// Whether it reads edges for lights of one shape, in a scene where triangles have holes or none has.
+    pub(crate) fn reads_edges_of(self, shape: ShapeKind, has_masks: bool) -> bool {
+        let needs = match self {
+            // A point has no penumbra.
+            Self::Ssoc(_) => shape != ShapeKind::Point,
+            // Beside triangles with holes edges come from maps.
+            Self::Oess(_) => !has_masks,
+            _ => true,
+        };
+        needs && self.reads_edges()
+    }
+
     /// What a light's counters ([`CapturedLight::counters`](crate::capture::CapturedLight::counters)) say
     /// about how far the result is to be trusted, if anything.
     pub fn remark(self, counters: &BTreeMap<String, u64>) -> Option<String> {

@@ -25,7 +25,7 @@ use crate::shadow::light_view::{LightView, LightViews, MAX_LIGHT_VIEWS, light_vi
 use crate::shadow::map::{ShadowMap, add_maps};
 use crate::shadow::receivers::add_receivers;
 use crate::shadow::silhouettes::{
-    SilhouetteRule, Silhouettes, add_blank, add_silhouettes, edge_count, skip_edges,
+    NO_EDGES, SilhouetteRule, Silhouettes, add_blank, add_silhouettes, edge_count, skip_edges,
 };
 use crate::shadow::uniform::add_uniform;
 use crate::shadow::{ShadowInputs, ShadowMask, hard, shape_number};
@@ -115,7 +115,7 @@ impl Surfaces {
     /// Declares a texel without a surface for each view, and notes what is left out.
     fn none(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, views: u32) -> Self {
         let skipped = ["map", "silhouettes", "umbra", "penumbra"];
-        skip_edges(graph, inputs, NAME, &skipped);
+        skip_edges(graph, inputs, NAME, &skipped, NO_EDGES);
         let name = format!("{NAME}.no_surfaces {}", inputs.light_name);
         let blank = add_blank(graph, name, vk::Format::R32G32_UINT, views.max(1));
         Self {

@@ -32,7 +32,7 @@ pub use options::{Buffer, Curve, DbufferOptions, Keep};
 
 use super::receivers::add_receivers;
 use super::shaft_masks::add_shafts;
-use super::silhouettes::{SilhouetteRule, add_silhouettes, skip_edges};
+use super::silhouettes::{NO_EDGES, SilhouetteRule, add_silhouettes, skip_edges};
 use super::uniform::add_uniform;
 use super::{LightParams, ShadowInputs, ShadowMask, ViewParams, casters, hard, shape_number};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
@@ -118,7 +118,8 @@ pub(super) fn add_edge_lists(
         let rule = SilhouetteRule::Layers;
         Some(add_silhouettes(graph, inputs, technique, rule, 1))
     } else {
-        skip_edges(graph, inputs, technique, &["silhouettes", "boxes", "lists"]);
+        let passes = ["silhouettes", "boxes", "lists"];
+        skip_edges(graph, inputs, technique, &passes, NO_EDGES);
         None
     };
     let receivers = add_receivers(graph, inputs, technique, shape.reach());

@@ -48,6 +48,7 @@ pub use options::{Find, MOST_SEGMENTS, OessOptions, Outreach};
 
 use super::light_view::LightView;
 use super::map::{MAP_SIZE, add_maps_of};
+use super::silhouettes::edge_count;
 use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, hard};
 use crate::geometry::DrawTarget;
@@ -120,8 +121,8 @@ pub(super) fn add_passes<'f>(
         return hard::add_passes_at(graph, inputs, options.resolution.unwrap_or(MAP_SIZE));
     }
     let scene = inputs.scene;
-    let has_edges = scene.edge_count() > 0 && !scene.has_masks();
-    if options.outreach == Outreach::Silhouettes && has_edges {
+    let by_mesh = options.outreach == Outreach::Silhouettes && !scene.has_masks();
+    if by_mesh && edge_count(inputs) > 0 {
         let texels = options.resolution.unwrap_or(MAP_SIZE);
         let line = LineParams::new(&inputs.light, length);
         return silhouettes::add_passes(graph, inputs, line, texels);

@@ -27,7 +27,7 @@
 //! | `outlines` | where along each edge it is an outline |
 //! | `bands` | the outer and the inner distortion map of a view |
 //! | `bands_second` | with `layers=2`: what another edge was before there |
-//! | `no_bands` | if the scene has no edges, in place of these four: maps of a texel without an edge |
+//! | `no_bands` | if the scene has no edges or the light no size, in place of these four: maps of a texel without an edge |
 //! | `start`, `tiles` | the picture's tiles that need work |
 //! | `visibility` | visibility |
 //! | `collisions`, `crowding` | how many bands share texels, if anyone wants the counts |
@@ -44,7 +44,7 @@ use super::map::{ShadowMap, add_maps_of};
 use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
 use super::silhouettes::{
-    SilhouetteRule, Silhouettes, add_blank, add_silhouettes, edge_count, skip_edges,
+    NO_EDGES, SilhouetteRule, Silhouettes, add_blank, add_silhouettes, edge_count, skip_edges,
 };
 use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, shape_number};
@@ -54,7 +54,7 @@ use crate::graph::{
     Access, Bind, BufferId, Graph, ImageDesc, ImageId, ImagePart, Load, PassBuilder, PassKind,
     Stage,
 };
-use crate::light::ShapeKind;
+use crate::light::{LightShape, ShapeKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -123,8 +123,12 @@ pub(super) fn add_passes<'f>(
     let views = light_views(&light, &inputs.receivers, &casters, margin);
     note_left_out(graph, inputs, NAME, &views);
     let [width, height] = inputs.camera.size();
-    let has_edges = edge_count(inputs) > 0;
-    let side = if has_edges { options.bands } else { 1 };
+    let needless = if matches!(light.shape, LightShape::Point) {
+        Some("a point has no penumbra")
+    } else {
+        (edge_count(inputs) == 0).then_some(NO_EDGES)
+    };
+    let side = needless.map_or(options.bands, |_| 1);
     let mut params = SsocParams {
         counts: [views.views.len() as u32, options.resolution, width, height],
         bands: [side, 0, 0, 0],
@@ -158,8 +162,8 @@ pub(super) fn add_passes<'f>(
     };
     let map = (depth, ids);
     let layers = views.views.len() as u32;
-    if !has_edges {
-        let blank = add_no_bands(graph, inputs, &options, layers);
+    if let Some(reason) = needless {
+        let blank = add_no_bands(graph, inputs, &options, layers, reason);
         let bands = (blank, blank);
         return ShadowMask::new(add_visibility(graph, inputs, &options, buffer, map, bands));
     }
@@ -254,11 +258,11 @@ fn add_no_bands(
     inputs: &ShadowInputs<'_>,
     options: &SsocOptions,
     views: u32,
+    reason: &str,
 ) -> ImageId {
-    skip_edges(graph, inputs, NAME, &["silhouettes", "outlines", "bands"]);
-    if options.layers > 1 {
-        skip_edges(graph, inputs, NAME, &["bands_second"]);
-    }
+    let passes = ["silhouettes", "outlines", "bands", "bands_second"];
+    let made = if options.layers > 1 { 4 } else { 3 };
+    skip_edges(graph, inputs, NAME, &passes[..made], reason);
     let name = format!("{NAME}.no_bands {}", inputs.light_name);
     add_blank(graph, name, vk::Format::R32_UINT, 2 * views.max(1))
 }

@@ -54,6 +54,39 @@ vec3 triangle_weights(uint triangle, vec3 p) {
     return weights_in_triangle(p, a, b, c, fetch_geometric_normal(triangle));
 }
 
+// The way from p to the nearest point of a triangle; none for a point over or under it.
+//
+// Which triangle a pixel shows is decided between corners that rasterisation has snapped to its grid. Beside an edge
+// that may be the neighbour of the one that the pixel's ray meets, and what the ray meets of its plane is then outside
+// of it. Where the surface is hollow such a point lies behind it, by many times what is rounding, and sees nothing of
+// the light. The triangle's nearest point is on the surface, and off the ray by no more than the grid's step. id: one
+// more than the triangle's number, or 0.
+vec3 way_into_triangle(vec3 p, uint id) {
+    uint triangle = max(id, 1u) - 1u;
+    vec3 corners[3] = vec3[](fetch_corner(triangle, 0u).position - p, fetch_corner(triangle, 1u).position - p,
+        fetch_corner(triangle, 2u).position - p);
+    vec3 normal = fetch_geometric_normal(triangle);
+    bool within = true;
+    vec3 way = vec3(0.0);
+    float least = 3.0e38;
+    for (uint i = 0u; i < 3u; ++i) {
+        vec3 a = corners[i];
+        vec3 along = corners[i == 2u ? 0u : i + 1u] - a;
+        vec3 inward = cross(normal, along);
+        float outside = dot(inward, a);
+        within = within && outside <= 0.0;
+        float square = max(dot(along, along), 1.0e-37);
+        float place = -dot(a, along);
+        // Each edge with its first end. Corners are met exactly.
+        vec3 to_edge = outside / square * inward + dot(normal, a) * normal;
+        vec3 offset = place > 0.0 && place < square ? to_edge : a;
+        float distance_square = dot(offset, offset);
+        way = distance_square < least ? offset : way;
+        least = min(least, distance_square);
+    }
+    return within || id == 0u ? vec3(0.0) : way;
+}
+
 ivec2 triangle_texel_place(uint texel) {
     return ivec2(texel % TRIANGLE_IMAGE_WIDTH, texel / TRIANGLE_IMAGE_WIDTH);
 }

@@ -185,6 +185,7 @@ float pixel_visibility(uvec2 pixel) {
     }
     vec3 ray = pixel_ray(view.camera, pixel);
     vec3 p = view.camera.eye.xyz + depth * ray;
+    p += way_into_triangle(p, id);
     vec3 n = fetch_geometric_normal(id - 1u);
     n = dot(n, ray) > 0.0 ? -n : n;
     bool sun = LIGHT_SHAPE == LIGHT_SUN;

@@ -240,6 +240,7 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     uint id = texelFetch(ids, ivec2(pixel), 0).x;
     vec3 ray = pixel_ray(view.camera, pixel);
     vec3 p = view.camera.eye.xyz + depth * ray;
+    p += way_into_triangle(p, id);
     vec3 n = fetch_geometric_normal(max(id, 1u) - 1u);
     n = dot(n, ray) > 0.0 ? -n : n;
     bool sun = LIGHT_SHAPE == LIGHT_SUN;

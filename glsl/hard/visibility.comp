@@ -57,6 +57,8 @@ float pixel_visibility(uvec2 pixel) {
     vec3 n = unpack_unit(texelFetch(geometric_normal, ivec2(pixel), 0).x);
     vec3 p = params.camera.eye.xyz + depth * pixel_ray(params.camera, pixel);
     bool hit = depth > 0.0;
+    uint id = texelFetch(ids, ivec2(pixel), 0).x;
+    p += way_into_triangle(p, hit ? id : 0u);
     // Asking the pixel too changes nothing, but for a branch on a uniform alone Mesa 22.3's software driver makes a
     // copy of the shader at every dispatch, and keeps it as long as the pipeline.
     bool sun = hit && params.light.w == 0.0;
@@ -78,7 +80,6 @@ float pixel_visibility(uvec2 pixel) {
             at = light_view_project(view, q);
         }
         if (all(equal(at.xy, clamp(at.xy, 0.0, 1.0)))) {
-            uint id = texelFetch(ids, ivec2(pixel), 0).x;
             Receiver receiver = Receiver(p, n, to_light, sun, id);
             visibility = hard_visibility(receiver, view, found, at.xy, float(params.counts.y));
         }

@@ -397,6 +397,7 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     }
     vec3 ray = pixel_ray(view.camera, pixel);
     vec3 p = view.camera.eye.xyz + depth * ray;
+    p += way_into_triangle(p, id);
     vec3 n = fetch_geometric_normal(id - 1u);
     n = dot(n, ray) > 0.0 ? -n : n;
     vec3 extent = max(max(abs(p), abs(view.camera.eye.xyz)), abs(view.light.center.xyz));

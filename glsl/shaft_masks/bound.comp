@@ -213,7 +213,8 @@ void main() {
     }
     vec3 ray = pixel_ray(view.camera, within);
     uint id = texelFetch(ids, ivec2(within), 0).x;
-    MaskReceiver receiver = MaskReceiver(view.camera.eye.xyz + depth * ray, id, true);
+    vec3 p = view.camera.eye.xyz + depth * ray;
+    MaskReceiver receiver = MaskReceiver(p + way_into_triangle(p, id), id, true);
     LightFrom light = light_from(view.light, receiver.position);
     Projection projection = projection_from(receiver, 0.0);
     vec3 normal = fetch_geometric_normal(max(id, 1u) - 1u);

@@ -82,9 +82,10 @@ MaskReceiver fetch_receiver(uvec2 pixel, vec2 depths, out uvec2 blocked) {
     float depth = texelFetch(view_depth, ivec2(within), 0).x;
     vec3 ray = pixel_ray(view.camera, within);
     MaskReceiver receiver;
-    receiver.position = view.camera.eye.xyz + depth * ray;
     receiver.in_part = is_in_part(depths, depth);
     receiver.id = depth > 0.0 ? texelFetch(ids, ivec2(within), 0).x : 0u;
+    receiver.position = view.camera.eye.xyz + depth * ray;
+    receiver.position += way_into_triangle(receiver.position, receiver.id);
     vec3 normal = fetch_geometric_normal(max(receiver.id, 1u) - 1u);
     normal = dot(normal, ray) > 0.0 ? -normal : normal;
     blocked = own_mask(rows_from(view.light, receiver.position), normal);

@@ -79,6 +79,12 @@ vec3 fetch_normal(uint id, vec3 ray) {
     return dot(n, ray) > 0.0 ? -n : n;
 }
 
+// Whether a pixel's point lies within its triangle, or there is nothing.
+bool is_within_triangle(uvec2 pixel) {
+    vec3 p = view.camera.eye.xyz + texelFetch(view_depth, ivec2(pixel), 0).x * pixel_ray(view.camera, pixel);
+    return way_into_triangle(p, texelFetch(ids, ivec2(pixel), 0).x) == vec3(0.0);
+}
+
 // Whether all of the light is below a surface's own plane, which then hides all samples: nothing else matters to it.
 // Masks are made of such pixels all the same; other techniques, which leave tiles whole, may want more of them.
 bool is_turned_away(Light light, vec3 p, vec3 n) {
@@ -179,10 +185,16 @@ void store_shaft(Light light, uvec2 tile, uvec2 tiles, TileBounds bounds, vec2 d
     vec3 normal = vec3(0.0);
     float plane_low = FAR;
     float plane_high = -FAR;
-    // Where a tile shows one triangle, or nothing, what is between its corners is between their surfaces.
-    uint looks = bounds.one_triangle ? 4u : TILE_SIZE * TILE_SIZE;
-    uint across_bits = bounds.one_triangle ? 1u : 3u; // of TILE_SIZE pixels
-    uint step = bounds.one_triangle ? TILE_SIZE - 1u : 1u;
+    // Where a tile shows one triangle, or nothing, what is between its corners is between their surfaces: if these lie
+    // within the triangle, so do all.
+    bool corners_tell = bounds.one_triangle;
+    for (uint i = 0u; i < 4u && corners_tell; ++i) {
+        uvec2 corner = (TILE_SIZE - 1u) * uvec2(i & 1u, i >> 1);
+        corners_tell = is_within_triangle(min(tile * TILE_SIZE + corner, size - 1u));
+    }
+    uint looks = corners_tell ? 4u : TILE_SIZE * TILE_SIZE;
+    uint across_bits = corners_tell ? 1u : 3u; // of TILE_SIZE pixels
+    uint step = corners_tell ? TILE_SIZE - 1u : 1u;
     for (uint i = 0u; i < looks; ++i) {
         uvec2 within = uvec2(i & ((1u << across_bits) - 1u), i >> across_bits);
         uvec2 pixel = min(tile * TILE_SIZE + step * within, size - 1u);
@@ -191,6 +203,7 @@ void store_shaft(Light light, uvec2 tile, uvec2 tiles, TileBounds bounds, vec2 d
         if (depth > 0.0 && is_in_part(depths, depth)) {
             vec3 ray = pixel_ray(view.camera, pixel);
             vec3 p = eye + depth * ray;
+            p += way_into_triangle(p, id);
             vec3 n = fetch_normal(id, ray);
             vec3 to_light = light_offset(light, p);
             above = above && dot(n, to_light) > dot(abs(n), light_reach) + SLACK * length(to_light);

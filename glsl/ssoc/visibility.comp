@@ -111,6 +111,8 @@ float pixel_visibility(uvec2 pixel) {
     vec3 n = unpack_unit(texelFetch(geometric_normal, ivec2(pixel), 0).x);
     vec3 p = view.camera.eye.xyz + depth * pixel_ray(view.camera, pixel);
     bool hit = depth > 0.0;
+    uint id = texelFetch(ids, ivec2(pixel), 0).x;
+    p += way_into_triangle(p, hit ? id : 0u);
     float above = light_above(view.light, LIGHT_SHAPE, p, n);
     if (FALLOFF != 0u && LIGHT_SHAPE != LIGHT_POINT) {
         vec3 offset = light_offset(view.light, p);
@@ -138,7 +140,7 @@ float pixel_visibility(uvec2 pixel) {
             // free, for that part of the light is taken off in any case.
             vec3 to_light = light_offset(view.light, p);
             bool sun = view.light.center.w == 0.0;
-            Receiver receiver = Receiver(p, n, to_light, sun, texelFetch(ids, ivec2(pixel), 0).x);
+            Receiver receiver = Receiver(p, n, to_light, sun, id);
             bool facing = dot(n, to_light) > 0.0;
             float texels_across = float(params.counts.y);
             bool hidden = facing

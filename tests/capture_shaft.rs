@@ -128,8 +128,8 @@ fn is_level(surface: &Surface, light: &AreaLight) -> bool {
 }
 
 /// Compares with rays. Rasterisation may find another triangle than the ray through a pixel's centre
-/// where that passes within a sub-texel step of an edge, and then shades a point beyond that
-/// triangle: such pixels are told by their normals and depths, and are few.
+/// where that passes within a sub-texel step of an edge, and then the nearest point of that triangle is
+/// shaded: such pixels are told by their normals and depths, and are few.
 fn compare(
     reference: &Reference<'_>,
     camera: &SceneCamera,

@@ -9,7 +9,7 @@ use antumbra::light::{AreaLight, LightShape};
 use antumbra::scene::{Aabb, SceneCamera};
 use antumbra::shadow::hard::HardParams;
 use antumbra::shadow::{LightParams, LightView, ViewParams, light_views, shape_number};
-use glam::{UVec2, Vec3, Vec4};
+use glam::{DVec3, UVec2, Vec3, Vec4, vec3};
 use support::work::{COMPUTE, STORAGE, bind, full_barrier, storage};
 use support::{compile, destroy_clean, gpu, serial};
 
@@ -148,6 +148,84 @@ fn pixel_rays_are_those_of_the_camera() {
 
 /// A point on a plane projects where the clip matrix puts it, and the plane's depth there, predicted
 /// from any other point of the plane, is the point's own.
+/// The point of a triangle that is nearest to one in its plane, in double precision.
+fn nearest_in_triangle(corners: [DVec3; 3], p: DVec3) -> DVec3 {
+    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    let edges = [0, 1, 2].map(|i| (corners[i], corners[(i + 1) % 3]));
+    if (edges.iter()).all(|(a, b)| normal.cross(*b - *a).dot(p - *a) >= 0.0) {
+        return p;
+    }
+    let on_edges = edges.map(|(a, b)| {
+        let part = (p - a).dot(b - a) / (b - a).length_squared();
+        a + part.clamp(0.0, 1.0) * (b - a)
+    });
+    (on_edges.into_iter())
+        .min_by(|a, b| a.distance(p).total_cmp(&b.distance(p)))
+        .unwrap()
+}
+
+/// Points in and around triangles of all sizes and shapes, far from the origin and off their planes too.
+#[test]
+fn points_beside_a_triangle_go_to_the_nearest_of_it() {
+    let _one = serial();
+    let shapes = [
+        [Vec3::ZERO, vec3(1.0, 0.2, 0.1), vec3(0.3, 0.9, -0.4)],
+        [Vec3::ZERO, vec3(1.0, 0.0, 0.0), vec3(0.4, 0.002, 0.003)],
+        [Vec3::ZERO, vec3(0.1, 0.0, 2.0), vec3(-1.5, 0.0, 0.3)],
+    ];
+    let head = "vec4 texels[4];
+        vec4 fetch_triangle_texel(uint texel) { return texels[texel]; }
+        #include \"common/triangles.glsl\"
+        layout(push_constant) uniform Push { vec4 corners[3]; vec4 plane; } push;";
+    let body = "for (uint i = 0u; i < 3u; ++i) { texels[i] = push.corners[i]; }
+        texels[3] = push.plane;
+        r = vec4(way_into_triangle(s.xyz, uint(s.w)), 0.0);";
+    for (size, away) in [(1.0, 0.0), (1.0e-3, 0.0), (1.0e-2, 8.0), (1.0e3, 0.0)] {
+        for shape in shapes {
+            let corners = shape.map(|p| size * p + away * vec3(1.0, -0.5, 0.8));
+            let exact = corners.map(Vec3::as_dvec3);
+            let (ab, ac) = (exact[1] - exact[0], exact[2] - exact[0]);
+            let normal = ab.cross(ac).normalize();
+            let mut points = vec![exact[0], exact[1], exact[2]];
+            for i in -6..=12 {
+                for j in -6..=12 {
+                    points.push(exact[0] + f64::from(i) / 6.0 * ab + f64::from(j) / 6.0 * ac);
+                }
+            }
+            let push =
+                [corners[0], corners[1], corners[2], normal.as_vec3()].map(|v| v.extend(0.0));
+            let rounding = f64::from(size + away) * 1.0e-6;
+            for lift in [0.0, 0.01 * f64::from(size)] {
+                let source = |p: &DVec3| (*p + lift * normal).as_vec3().extend(1.0).to_array();
+                let source: Vec<[f32; 4]> = points.iter().map(source).collect();
+                let results = map(head, body, bytemuck::bytes_of(&push), &source);
+                for (result, source) in results.iter().zip(&source) {
+                    let p = Vec3::from_slice(source).as_dvec3();
+                    let height = (p - exact[0]).dot(normal);
+                    let in_plane = p - height * normal;
+                    let nearest = nearest_in_triangle(exact, in_plane);
+                    let way = Vec3::from_slice(result).as_dvec3();
+                    // One over the triangle stays where it is, one over its outline may.
+                    let outside = nearest.distance(in_plane);
+                    let stays = way == DVec3::ZERO && outside < 2.0 * rounding;
+                    let error = (p + way).distance(nearest);
+                    assert!(
+                        stays || error < 2.0 * rounding,
+                        "{corners:?} {p}: {way}, {nearest}"
+                    );
+                }
+            }
+            let none = map(
+                head,
+                body,
+                bytemuck::bytes_of(&push),
+                &[[9.0, 9.0, 9.0, 0.0]],
+            );
+            assert_eq!(none, [[0.0; 4]]);
+        }
+    }
+}
+
 #[test]
 fn a_plane_has_the_depth_that_is_predicted_for_it() {
     let _one = serial();

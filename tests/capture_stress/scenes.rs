@@ -2,9 +2,10 @@
 
 use crate::compare::{Change, known};
 use crate::limits::{is_quick, judge, leak, limits, techniques};
-use crate::rig::{PIXELS, Rig};
+use crate::rig::{PIXELS, Rig, SIDE};
 use crate::support;
 use antumbra::light::ShapeKind;
+use antumbra::reference::{Reference, Sampling, Settings};
 use antumbra::shadow::Technique;
 use antumbra::stress::{Case, LIGHT_FACTORS, cases, large, steps_of_blockers};
 use std::time::Instant;
@@ -175,6 +176,39 @@ fn a_blocker_more_never_brightens() {
     }
     rig.end();
     judge(&faults);
+}
+
+/// Triangles narrower than a pixel: of some pixels rasterisation finds the neighbour of the triangle that the ray
+/// meets, and where the sheet is hollow that one's plane lies behind it. What is fully lit is not hidden by that, with
+/// techniques that decide by the triangles themselves.
+#[test]
+fn a_finely_divided_sheet_does_not_hide_its_own_points() {
+    let _one = support::serial();
+    let mut rig = Rig::new();
+    let mut faults = Vec::new();
+    for triangles in [5_000, 20_000, 60_000] {
+        let case = large(triangles);
+        let reference = Reference::new(&case.scene).unwrap();
+        let settings = Settings {
+            camera: &case.camera,
+            size: [SIDE; 2],
+            light: case.area_light(),
+            sampling: &Sampling::Plain { samples: 64 },
+        };
+        let truth = reference.render(&settings, &|_| ()).unwrap();
+        for technique in ["hard", "ssoc", "dbuffer", "shaft-masks"] {
+            let picture = rig.draw(&case, technique.parse().unwrap());
+            let is_lit = |i: &usize| truth.valid[*i] && truth.visibility[*i] == 1.0;
+            let lit: Vec<usize> = (0..PIXELS).filter(is_lit).collect();
+            assert!(lit.len() > PIXELS / 3);
+            let dark: Vec<&usize> = lit.iter().filter(|i| picture[**i] < 0.9).collect();
+            if !dark.is_empty() {
+                faults.push(format!("{triangles} {technique}: {dark:?}"));
+            }
+        }
+    }
+    rig.end();
+    assert!(faults.is_empty(), "{faults:#?}");
 }
 
 /// Run by hand: memory and time of 1.5 million triangles.

@@ -52,6 +52,36 @@ vec4 fetch_shaft_texel(ivec2 place) {
     return texelFetch(shafts, place, 0);
 }
 
+// Where a tile's list goes on.
+struct List {
+    uint first; // its first chunk
+    uint count;
+    uint chunk; // its last one
+    uint slot;
+    bool complete;
+};
+
+// Puts a triangle into the list.
+void list_triangle(inout List list, uint triangle) {
+    if (list.slot == CHUNK) {
+        uint fresh = atomicAdd(chunks_used, 1u);
+        if (fresh >= params.counts.w) {
+            list.complete = false;
+        } else if (list.count == 0u) {
+            list.first = fresh;
+        } else {
+            imageStore(pool, chunk_entry_place(list.chunk, CHUNK), uvec4(fresh));
+        }
+        list.chunk = fresh;
+        list.slot = 0u;
+    }
+    if (list.complete) {
+        imageStore(pool, chunk_entry_place(list.chunk, list.slot), uvec4(triangle));
+        list.slot += 1u;
+        list.count += 1u;
+    }
+}
+
 void main() {
     uint index = spread_entry(gl_WorkGroupID.x, gl_NumWorkGroups.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (index >= arguments.count) {
@@ -64,56 +94,60 @@ void main() {
     Surfaces surfaces = fetch_surfaces(part, view.light);
 
     uint nodes = params.counts.z;
-    uint first = 0u;
-    uint count = 0u;
-    bool complete = true;
-    uint chunk = 0u;
-    uint slot = CHUNK;
+    List found = List(0u, 0u, 0u, CHUNK, true);
     bool any_cancels = false;
-    uint short_list[SHORT_LIST];
+    // Triangles wait here, in registers, until there are some to list: a vector goes through what stores them whenever
+    // one of its lanes may have any.
+    uint waiting[SHORT_LIST];
+    for (uint i = 0u; i < SHORT_LIST; ++i) {
+        waiting[i] = 0u;
+    }
+    uint count = 0u;
     uint node = 0u;
     uint steps = 0u;
-    do {
-        if (node < nodes) {
+    bool more = true;
+    while (more) {
+        while (count > 0u && found.complete) {
+            list_triangle(found, waiting[0]);
+            for (uint i = 1u; i < SHORT_LIST; ++i) {
+                waiting[i - 1u] = waiting[i];
+            }
+            count -= 1u;
+        }
+        while (node < nodes && count < SHORT_LIST && steps < MOST_STEPS) {
             Step step = step_at(shaft, surfaces, node);
             any_cancels = any_cancels || step.cancels;
             node = step.next;
-            if (step.is_met) {
-                if (slot == CHUNK) {
-                    uint fresh = atomicAdd(chunks_used, 1u);
-                    if (fresh >= params.counts.w) {
-                        complete = false;
-                    } else if (count == 0u) {
-                        first = fresh;
-                    } else {
-                        imageStore(pool, chunk_entry_place(chunk, CHUNK), uvec4(fresh));
-                    }
-                    chunk = fresh;
-                    slot = 0u;
-                }
-                if (complete) {
-                    imageStore(pool, chunk_entry_place(chunk, slot), uvec4(step.triangle));
-                    if (count < SHORT_LIST) {
-                        short_list[count] = step.triangle;
-                    }
-                    slot += 1u;
-                    count += 1u;
-                }
+            for (uint i = 0u; i < SHORT_LIST; ++i) {
+                waiting[i] = step.is_met && i == count ? step.triangle : waiting[i];
             }
+            count += step.is_met ? 1u : 0u;
+            steps += 1u;
         }
-        steps += 1u;
-        complete = complete && (steps < MOST_STEPS || node >= nodes);
-    } while (complete && node < nodes);
+        found.complete = found.complete && (node >= nodes || steps < MOST_STEPS);
+        more = found.complete && node < nodes;
+    }
 
-    bool lit = complete && !any_cancels && count <= SHORT_LIST && shaft.low.w > 0.0;
-    lit = lit && !any_hides(view.light, surfaces, shaft, fetch_some_surface(part), short_list, count);
+    bool is_short = found.complete && found.count == 0u && !any_cancels && shaft.low.w > 0.0;
+    vec3 some = fetch_some_surface(part);
+    bool lit = is_short && !any_hides(view.light, surfaces, shaft, some, waiting, is_short ? count : 0u);
     if (lit) {
         imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(LEVEL_LIT)); // as all is at the beginning
-    } else {
+        count = 0u;
+    }
+    while (count > 0u && found.complete) {
+        list_triangle(found, waiting[0]);
+        for (uint i = 1u; i < SHORT_LIST; ++i) {
+            waiting[i - 1u] = waiting[i];
+        }
+        count -= 1u;
+    }
+    if (!lit) {
         uint at = atomicAdd(penumbra.count, 1u);
         atomicMax(penumbra.groups_x, min(at + 1u, TILE_ROW));
         atomicMax(penumbra.groups_y, at / TILE_ROW + 1u);
         imageStore(penumbra_list, tile_entry_place(at, tiles), uvec4(entry));
-        imageStore(lists, list_place(part), uvec4(first, count, complete ? nodes : 0u, TILE_OPEN));
+        uint resume = found.complete ? nodes : 0u;
+        imageStore(lists, list_place(part), uvec4(found.first, found.count, resume, TILE_OPEN));
     }
 }

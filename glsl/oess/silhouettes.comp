@@ -146,7 +146,6 @@ struct LineReceiver {
     vec2 range;       // of the line, above the receiver's plane
     vec3 row_u;       // of the coordinates above
     vec3 row_w;
-    vec3 row_h;       // unit vector
 };
 
 LineReceiver line_receiver(vec3 p, vec3 n, float rounding_m) {
@@ -166,7 +165,6 @@ LineReceiver line_receiver(vec3 p, vec3 n, float rounding_m) {
     float square = max(dot(across, across), 1.0e-37);
     r.row_u = cross(r.from, across) / square;
     r.row_w = cross(across, r.along) / square;
-    r.row_h = across * inversesqrt(square);
     return r;
 }
 
@@ -352,10 +350,10 @@ float traced(LineReceiver r, float from, inout uint steps) {
 
 // What is known of a receiver's line.
 struct Sight {
-    bool known;  // whether it is seen where there are at most so many surfaces:
+    bool known; // whether it is seen where there are at most so many surfaces:
     int most;
-    int hidden;  // where there are so many it is not
-    uint steps;  // of rays so far
+    int hidden; // where there are so many it is not
+    uint steps; // of rays so far
 };
 
 // Finds out where a part of the line is seen. center: how many surfaces the centre is behind, at least.

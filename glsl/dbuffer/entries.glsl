@@ -54,10 +54,17 @@ uint next_entry(inout Entries entries, out bool has_more) {
     return entry;
 }
 
+// How many blocks of silhouettes a tile has lists of. Asking for the tile changes nothing, but for a loop that ends by a
+// uniform alone Mesa 22.3's software driver may make a copy of the shader each time it is used, and keep it as long as
+// the pipeline.
+uint blocks_of(uint tile, uint tiles, uint blocks) {
+    return tile < tiles ? blocks : 0u;
+}
+
 // Edges that a receiver of the tile would look at.
 uint edges_of(uint tile, uint tiles, uint blocks) {
     uint count = 0u;
-    for (uint block = 0u; block < blocks; ++block) {
+    for (uint block = 0u; block < blocks_of(tile, tiles, blocks); ++block) {
         uvec4 stored = fetch_list_texel(list_place(block, tile, tiles));
         count += stored.y + stored.w - stored.z;
     }

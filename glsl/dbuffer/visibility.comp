@@ -122,7 +122,7 @@ bool next_chunk(CoverageReceiver r, inout Entries entries) {
 // go through the rest. (A loop that tests its condition at its end loses the values of lanes that leave it early
 // on Mesa 22.3.)
 void add_edges(uint tile, uint tiles, CoverageReceiver r, inout Coverage found) {
-    for (uint block = 0u; block < params.sizes.x; ++block) {
+    for (uint block = 0u; block < blocks_of(tile, tiles, params.sizes.x); ++block) {
         Entries entries = list_entries(block, tile, tiles);
         bool in_chunk = false;
         while (in_chunk || has_entries(entries)) {

@@ -26,6 +26,9 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
+// 1 for a light that varies along its length. (2 is in dbuffer/ray.glsl.)
+layout(constant_id = 3) const uint PROFILE = 0u;
+
 layout(set = 0, binding = 0, std140) uniform View {
     ViewParams view;
 };
@@ -47,7 +50,7 @@ layout(set = 0, binding = 9) uniform usampler2D numbers;
 // Storage images: software drivers read them faster than textures.
 layout(set = 0, binding = 10, rgba32f) uniform readonly image2D ends;
 layout(set = 0, binding = 11, r32ui) uniform readonly uimage2D pool;
-layout(set = 0, binding = 12, rgba32f) uniform readonly image2D chunk_boxes;
+layout(set = 0, binding = 12, rgba32ui) uniform readonly uimage2D spans;
 layout(set = 0, binding = 13) uniform usampler2D lists;
 layout(set = 0, binding = 14) uniform sampler2D hard;
 layout(set = 0, binding = 15, r32f) uniform writeonly image2D visibility;
@@ -63,23 +66,27 @@ layout(set = 0, binding = 19, rgba32f) uniform readonly image2D turns;
 
 #include "dbuffer/ray.glsl"
 
-// Cells of the line above the receiver's plane. One edge within a cell lies exactly where it is, and so do two; of
-// more, what they have in common counts.
+// Edges before a receiver's line that are kept at a time. Few receivers have as many; those go through their edges
+// again for those further along the line.
+const uint MOST_KEPT = 10u;
+
+// Turns of loops after which a receiver looks at no further edge, but sends rays to what is left of the line. A software
+// driver may end loops after 65,535 turns of a receiver and those beside it; steps of rays (MOST_STEPS) are counted
+// apart.
+const uint MOST_TURNS = 4096u;
+
+// Turns that an edge takes: loops within, which software drivers go through once at least.
+const uint EDGE_TURNS = 4u;
+
+// Places of the line that rays go to where edges are not known.
 const uint CELLS = 32u;
 
 // What positions are rounded by, as a part of the largest coordinate that they are made from.
 const float POSITION_ROUNDING = 1.0 / 2097152.0;
 
-// Rays that a receiver may send to tell how many surfaces there are: a count that rounding has taken an edge
-// from is not the last word.
-const uint MOST_RAYS = 3u;
-
-// Part of the line within which an edge may hide the centre or not by rounding.
+// Part of the line within which an edge may hide the centre or not by rounding, and that is too narrow to tell by
+// whether it has fewer surfaces: edges that lie on each other, as those of a triangle without area do, may part so far.
 const float NEAR = 1.0 / 4096.0;
-
-// Part of a cell that is too narrow to tell by whether a place of it has fewer surfaces: edges that lie on each other,
-// as those of a triangle without area do, may part by rounding.
-const float NARROW = float(CELLS) * NEAR;
 
 // Square of the sine of the angle at the line's axis within which a receiver sees the line as a point.
 const float ON_AXIS = 1.0e-10;
@@ -122,7 +129,7 @@ uvec4 fetch_list_texel(ivec2 place) {
 }
 
 float profile_cells() {
-    return line.axis.w;
+    return PROFILE != 0u ? line.axis.w : 0.0;
 }
 
 vec4 fetch_profile(uint cell) {
@@ -139,7 +146,6 @@ struct LineReceiver {
     vec2 range;       // of the line, above the receiver's plane
     vec3 row_u;       // of the coordinates above
     vec3 row_w;
-    vec3 row_h;       // unit vector
 };
 
 LineReceiver line_receiver(vec3 p, vec3 n, float rounding_m) {
@@ -159,7 +165,6 @@ LineReceiver line_receiver(vec3 p, vec3 n, float rounding_m) {
     float square = max(dot(across, across), 1.0e-37);
     r.row_u = cross(r.from, across) / square;
     r.row_w = cross(across, r.along) / square;
-    r.row_h = across * inversesqrt(square);
     return r;
 }
 
@@ -174,123 +179,145 @@ float edge_place(LineReceiver r, vec3 a, vec3 b, vec2 sides) {
     return before && place > 0.0 && place < 1.0 ? place : -1.0;
 }
 
-// Whether the plane may cut anything in a box where it matters: the largest of each function over it.
-bool box_may_matter(LineReceiver r, vec3 low, vec3 high) {
-    vec3 middle = 0.5 * (low + high) - r.p;
-    vec3 half_size = 0.5 * (high - low) + r.rounding_m;
-    vec3 after = r.row_u - r.range.x * r.row_w;
-    vec3 before = r.range.y * r.row_w - r.row_u;
-    vec3 w = abs(r.row_w);
-    return abs(dot(r.row_h, middle)) <= dot(abs(r.row_h), half_size)
-        && dot(r.row_w, middle) + dot(w, half_size) > 0.0
-        && dot(r.row_w, middle) - dot(w, half_size) < 1.0
-        && dot(after, middle) + dot(abs(after), half_size) > 0.0
-        && dot(before, middle) + dot(abs(before), half_size) > 0.0
-        && dot(r.n, middle) + dot(abs(r.n), half_size) > 0.0;
-}
-
-// What a tile's edges change. Of each cell: by how much the number of surfaces rises over it; the same times
-// its place in the cell, summed up; the largest change of one edge; all changes, of either sign.
-vec4 cells[CELLS];
-// Places in the cell of its first and last edge.
-vec2 extents[CELLS];
+// Edges in order: the place along the line in units of 2^-24, and below it by how much the number of surfaces rises
+// there. Loops of known length alone ask for them, so that drivers may keep them in registers: memory that each lane
+// reads at a place of its own is slow. (Hints to unroll are too much for SwiftShader's compiler.)
+uint kept[MOST_KEPT];
+uint found_edges;
+uint turns_taken;
 // Changes before the line's centre, x without and y with what is within rounding of it.
 vec2 before_center;
-uint found_edges;
 
-// a, b: its ends, scene space.
-void add_edge(LineReceiver r, uint number, vec3 a, vec3 b, float place, bool rises, float center) {
+const uint CHANGE_BITS = 8u;
+const float PLACES = 16777216.0;
+const uint END = 0xffffff00u; // of the line
+const uint NO_EDGE = 0xffffffffu;
+
+float place_of(uint edge) {
+    return edge < END ? float(edge >> CHANGE_BITS) / PLACES : 1.0;
+}
+
+int change_of(uint edge) {
+    return int(edge << 32u - CHANGE_BITS) >> 32u - CHANGE_BITS;
+}
+
+// Puts an edge in where it belongs; the last one goes.
+void keep(uint edge) {
+    uint before = 0u;
+    for (uint i = 0u; i < MOST_KEPT; ++i) {
+        uint here = kept[i];
+        kept[i] = max(before, min(edge, here));
+        before = here;
+    }
+}
+
+// a, b: its ends, scene space. start: the first place that is looked at.
+void add_edge(LineReceiver r, uint number, vec3 a, vec3 b, float place, bool rises, float center, uint start) {
     float faces = faces_on_one_side(r.p, 1.0, fetch_edge(number), a, b);
     // Along the line one comes to the positive side of the plane through receiver and edge, if the edge rises.
     float change = rises ? faces : -faces;
-    float at = place * float(CELLS);
-    uint i = min(uint(at), CELLS - 1u);
-    float within = at - float(i);
-    vec4 cell = cells[i];
-    cells[i] = vec4(cell.xy + change * vec2(1.0, within), max(cell.z, abs(change)), cell.w + abs(change));
-    vec2 extent = extents[i];
-    extents[i] = change != 0.0 ? vec2(min(extent.x, within), max(extent.y, within)) : extent;
     before_center += change * vec2(lessThan(vec2(place), center + vec2(-NEAR, NEAR)));
-    found_edges += 1u;
+    // No edge has as many faces as there is no room for.
+    uint low = uint(int(clamp(change, -127.0, 127.0))) & (1u << CHANGE_BITS) - 1u;
+    uint edge = uint(place * PLACES) << CHANGE_BITS | low;
+    bool counts = change != 0.0 && edge >= start;
+    keep(counts ? edge : NO_EDGE);
+    found_edges += counts ? 1u : 0u;
+}
+
+// Entries of a list, up to four: those that are not done, a bit for each.
+struct Four {
+    uint first;  // place of the first in the pool, or its number
+    bool listed; // whether they are in the pool
+    uint left;
+};
+
+// The next entries of a list, or of what it does not know, and which of them may matter.
+Four next_four(inout Entries entries, uint turn) {
+    Four four;
+    four.listed = entries.rest > 0u;
+    uint texel = entries.slot / SPANS;
+    uint passed = entries.missing % SPANS; // of a texel's silhouettes
+    four.first = four.listed ? entries.chunk * (CHUNK + 1u) + entries.slot : entries.missing - passed;
+    uint most = texel == SPAN_TEXELS - 1u ? SPANS - 1u : SPANS;
+    uint count = four.listed ? min(entries.rest, most) : min(entries.end - four.first, SPANS);
+    uint chunk = four.listed ? entries.chunk : params.counts.w;
+    uvec4 found = imageLoad(spans, span_place(chunk, four.listed ? texel : entries.missing / SPANS));
+    four.left = in_spans(found, turn) & (1u << count) - 1u;
+    four.left &= four.listed ? 0xffffffffu : 0xffffffffu << passed;
+    bool last = texel == SPAN_TEXELS - 1u;
+    entries.chunk = last ? found.w : entries.chunk;
+    entries.slot = last ? 0u : entries.slot + SPANS;
+    entries.rest -= four.listed ? count : 0u;
+    entries.missing += four.listed ? 0u : count - passed;
+    return four;
 }
 
 // As add_edges in dbuffer/visibility.comp: lanes look for what matters to them in loops of their own.
-void add_edges(uint tile, uint tiles, LineReceiver r, float center) {
-    for (uint block = 0u; block < params.sizes.x; ++block) {
+void add_edges(uint tile, uint tiles, LineReceiver r, float center, uint start) {
+    uint turn = uint(turn_of(r.across)) & TURN_STEPS - 1u;
+    for (uint block = 0u; block < blocks_of(tile, tiles, params.sizes.x); ++block) {
         Entries entries = list_entries(block, tile, tiles);
-        bool in_chunk = false;
-        while (in_chunk || has_entries(entries)) {
-            while (!in_chunk && has_entries(entries)) {
-                bool listed = begin_chunk(entries);
-                vec3 low = imageLoad(chunk_boxes, triangle_texel_place(2u * entries.chunk)).xyz;
-                vec3 high = imageLoad(chunk_boxes, triangle_texel_place(2u * entries.chunk + 1u)).xyz;
-                in_chunk = !listed || box_may_matter(r, low, high);
-                if (!in_chunk) {
-                    skip_chunk(entries);
-                }
+        Four four = Four(0u, false, 0u);
+        while ((four.left != 0u || has_entries(entries)) && turns_taken < MOST_TURNS) {
+            while (four.left == 0u && has_entries(entries)) {
+                four = next_four(entries, turn);
+                turns_taken += 1u;
             }
-            bool cut = false;
-            uint entry = 0u;
-            vec2 sides = vec2(0.0);
-            while (in_chunk && !cut) {
-                entry = next_entry(entries, in_chunk);
-                vec4 turn = imageLoad(turns, triangle_texel_place(entry));
-                sides = vec2(side_of_line(r.across, turn.xy), side_of_line(r.across, turn.zw));
-                cut = (sides.x > 0.0) != (sides.y > 0.0);
-            }
-            if (cut) {
-                vec3 a = imageLoad(ends, triangle_texel_place(2u * entry)).xyz;
-                vec3 b = imageLoad(ends, triangle_texel_place(2u * entry + 1u)).xyz;
-                float place = edge_place(r, a - r.p, b - r.p, sides);
-                if (place >= 0.0) {
-                    uint number = texelFetch(numbers, triangle_texel_place(entry), 0).x;
-                    add_edge(r, number, a, b, place, sides.y > 0.0, center);
+            turns_taken += EDGE_TURNS;
+            if (four.left != 0u) {
+                uint at = four.first + uint(findLSB(four.left));
+                four.left &= four.left - 1u;
+                uint entry = four.listed ? imageLoad(pool, triangle_texel_place(at)).x : at;
+                vec4 turns_of = imageLoad(turns, triangle_texel_place(entry));
+                vec2 sides = vec2(side_of_line(r.across, turns_of.xy), side_of_line(r.across, turns_of.zw));
+                if ((sides.x > 0.0) != (sides.y > 0.0)) {
+                    vec3 a = imageLoad(ends, triangle_texel_place(2u * entry)).xyz;
+                    vec3 b = imageLoad(ends, triangle_texel_place(2u * entry + 1u)).xyz;
+                    float place = edge_place(r, a - r.p, b - r.p, sides);
+                    if (place >= 0.0) {
+                        uint number = texelFetch(numbers, triangle_texel_place(entry), 0).x;
+                        add_edge(r, number, a, b, place, sides.y > 0.0, center, start);
+                    }
                 }
             }
         }
     }
 }
 
-// The part of a cell that has at most so many surfaces before it; those at its start and changes in it.
-float free_part(float most, float number, vec4 cell, vec2 extent) {
-    bool free = number <= most;
-    bool free_after = number + cell.x <= most;
-    float moved = cell.y / (free == free_after ? max(cell.z, 1.0) : cell.x);
-    // Two edges in a free cell hide what is between them. In one that is not they bound a gap, if what one
-    // edge changes makes it free.
-    bool gap = !free && !free_after && number - cell.z <= most && number + cell.x - cell.z <= most;
-    // Of several edges that hide more and more, the first counts; of several that hide less and less the last.
-    bool one_way = cell.w == abs(cell.x);
-    float until = one_way ? extent.x : moved;
-    float after = 1.0 - (one_way ? extent.y : moved);
-    float part = free == free_after ? (free ? 1.0 + moved : (gap ? moved : 0.0)) : (free ? until : after);
-    return clamp(part, 0.0, 1.0);
-}
+// A part of the line: its begin, and the number of surfaces there; the end of what is known.
+struct Part {
+    float from;
+    int number;
+    uint end;
+};
 
-// The better of two places: first fewer surfaces, then more room. x: surfaces; y: the place; z: its room, in cells.
-vec3 better_place(vec3 one, vec3 other, float least) {
-    bool better = other.x >= least && other.z > NARROW
-        && (other.x < one.x || (other.x == one.x && other.z > one.z));
-    return better ? other : one;
-}
+// A number of surfaces, and a place that has it: the middle of the widest part of the line with so many.
+struct Level {
+    int number;
+    float place;
+};
 
-// The least number of surfaces that is at least as large as asked for, and a place that has it.
-vec2 least_number(float least, uint count) {
-    vec3 found = vec3(count > 0u ? 1.0e9 : max(least, 0.0), 0.5, 0.0);
-    float number = 0.0;
-    for (uint i = 0u; i < count; ++i) {
-        vec4 cell = cells[i];
-        // Before its first edge, after its last one, and a gap between two edges.
-        vec2 extent = extents[i];
-        float after = number + cell.x;
-        float gap = number == after ? cell.y / max(cell.z, 1.0) : 0.0;
-        vec3 places = (float(i) + 0.5 * vec3(extent.x, extent.y + 1.0, extent.x + extent.y)) / float(CELLS);
-        found = better_place(found, vec3(number, places.x, extent.x), least);
-        found = better_place(found, vec3(after, places.y, 1.0 - extent.y), least);
-        found = better_place(found, vec3(number - cell.z, places.z, gap), least);
-        number = after;
+const int NONE = 0x7fffffff;
+
+// The least number of surfaces of a part.
+Level least_number(Part part) {
+    Level found = Level(NONE, 0.5);
+    float widest = 0.0;
+    int number = part.number;
+    float from = part.from;
+    for (uint i = 0u; i <= MOST_KEPT; ++i) {
+        uint edge = i < MOST_KEPT ? min(kept[i], part.end) : part.end;
+        float to = place_of(edge);
+        float room = to - from;
+        bool better = room > NEAR && (number < found.number || (number == found.number && room > widest));
+        found.place = better ? 0.5 * (from + to) : found.place;
+        found.number = better ? number : found.number;
+        widest = better ? room : widest;
+        number += change_of(edge);
+        from = to;
     }
-    return found.xy;
+    return found;
 }
 
 vec3 to_line(LineReceiver r, float place) {
@@ -301,21 +328,63 @@ float light_in(LineReceiver r, float from, float to) {
     return light_before(mix(r.range.x, r.range.y, to)).x - light_before(mix(r.range.x, r.range.y, from)).x;
 }
 
-// Light that rays to the middles of cells reach.
-float traced(LineReceiver r) {
-    uint steps = 0u;
+// The light after a place of the line that rays to the middles of cells reach.
+float traced(LineReceiver r, float from, inout uint steps) {
+    float width = 1.0 / float(CELLS);
+    uint count = uint(ceil((1.0 - from) * float(CELLS)));
     float sum = 0.0;
     float done = 0.0;
-    float all = light_in(r, 0.0, 1.0);
-    for (uint i = 0u; i < CELLS && steps < MOST_STEPS; ++i) {
-        float place = (float(i) + 0.5) / float(CELLS);
-        bool blocked = ray_is_blocked(r.p, to_line(r, place), false, params.counts.z, r.rounding_m, SOLID, steps);
+    for (uint i = 0u; i < count && steps < MOST_STEPS; ++i) {
+        float to = 1.0 - float(i) * width;
+        float begin = max(to - width, from);
+        bool blocked = ray_is_blocked(
+            r.p, to_line(r, 0.5 * (begin + to)), false, params.counts.z, r.rounding_m, SOLID, steps);
         bool known = blocked || steps < MOST_STEPS;
-        float light = known ? light_in(r, float(i) / float(CELLS), float(i + 1u) / float(CELLS)) : 0.0;
+        float light = known ? light_in(r, begin, to) : 0.0;
         done += light;
         sum += blocked ? 0.0 : light;
     }
+    float all = count > 0u ? light_in(r, from, 1.0) : 0.0;
     return done > 0.0 ? sum / done * all : all;
+}
+
+// What is known of a receiver's line.
+struct Sight {
+    bool known; // whether it is seen where there are at most so many surfaces:
+    int most;
+    int hidden; // where there are so many it is not
+    uint steps; // of rays so far
+};
+
+// Finds out where a part of the line is seen. center: how many surfaces the centre is behind, at least.
+void look(LineReceiver r, Part part, int center, bool first, bool center_above, bool center_seen, inout Sight sight) {
+    Level level = least_number(part);
+    sight.most = first ? center : sight.most;
+    // A centre that is seen behind more surfaces than are elsewhere is a contradiction that a ray decides.
+    sight.known = sight.known || (first && center_seen && level.number >= center);
+    // Nothing to find out where as few surfaces hide all, and where no edge is.
+    bool settled = sight.known || level.number >= sight.hidden || (first && found_edges == 0u && center_above);
+    if (!settled) {
+        vec3 to = to_line(r, level.place);
+        sight.known = !ray_is_blocked(r.p, to, false, params.counts.z, r.rounding_m, SOLID, sight.steps);
+        sight.most = level.number;
+        sight.hidden = sight.known ? sight.hidden : level.number;
+    }
+}
+
+// The light of a part of the line that is seen. Goes on to the end of the part.
+float light_of_part(LineReceiver r, inout Part part, Sight sight) {
+    float sum = 0.0;
+    float before = light_before(mix(r.range.x, r.range.y, part.from)).x;
+    for (uint i = 0u; i <= MOST_KEPT; ++i) {
+        uint edge = i < MOST_KEPT ? min(kept[i], part.end) : part.end;
+        float after = light_before(mix(r.range.x, r.range.y, place_of(edge))).x;
+        sum += sight.known && part.number <= sight.most ? after - before : 0.0;
+        part.number += change_of(edge);
+        before = after;
+    }
+    part.from = place_of(part.end);
+    return sum;
 }
 
 float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
@@ -342,48 +411,31 @@ float pixel_visibility(uvec2 pixel, uint tile, uint tiles) {
     if (dot(across, across) <= ON_AXIS * dot(r.along, r.along) * dot(r.from, r.from)) {
         return center_seen ? light_in(r, 0.0, 1.0) : 0.0;
     }
-    if (edges_of(tile, tiles, params.sizes.x) > params.sizes.z || through.cut.x != 0u) {
-        return traced(r);
-    }
-
-    for (uint i = 0u; i < CELLS; ++i) {
-        cells[i] = vec4(0.0);
-        extents[i] = vec2(1.0, 0.0);
-    }
-    before_center = vec2(0.0);
-    found_edges = 0u;
-    add_edges(tile, tiles, r, center);
-
-    // Software drivers walk through branches that nobody takes, but not through loops.
-    uint count = found_edges > 0u ? CELLS : 0u;
-    float most = min(before_center.x, before_center.y);
-    vec2 found = least_number(-1.0e9, count);
-    // A centre that is seen behind more surfaces than are elsewhere is a contradiction that a ray decides.
-    bool known = center_seen && found.x >= most;
-    // One ray is enough where no place has fewer surfaces than the centre, which is hidden, and where no edge is.
-    bool check = count == 0u
-        || (center_above && !center_seen && found.x >= max(before_center.x, before_center.y));
-    uint rays = known || (count == 0u && center_above) ? 0u : (check ? 1u : MOST_RAYS);
-    uint steps = 0u;
-    while (rays > 0u) {
-        most = found.x;
-        known = !ray_is_blocked(p, to_line(r, found.y), false, params.counts.z, rounding_m, SOLID, steps);
-        found = least_number(most + 0.5, count);
-        rays = known || found.x >= 1.0e9 ? 0u : rays - 1u;
-    }
-    if (!known) {
-        return 0.0;
-    }
-    float sum = count > 0u ? 0.0 : light_in(r, 0.0, 1.0);
-    float number = 0.0;
-    for (uint i = 0u; i < count; ++i) {
-        vec4 cell = cells[i];
-        float part = free_part(most, number, cell, extents[i]);
-        if (part > 0.0) {
-            sum += part * light_in(r, float(i) / float(CELLS), float(i + 1u) / float(CELLS));
+    bool listed = edges_of(tile, tiles, params.sizes.x) <= params.sizes.z && through.cut.x == 0u;
+    Part part = Part(0.0, 0, listed ? END : 0u);
+    Sight sight = Sight(false, NONE, NONE, 0u);
+    float sum = 0.0;
+    uint start = 0u;
+    bool more = listed;
+    turns_taken = 0u;
+    while (more) {
+        for (uint i = 0u; i < MOST_KEPT; ++i) {
+            kept[i] = NO_EDGE;
         }
-        number += cell.x;
+        before_center = vec2(0.0);
+        found_edges = 0u;
+        add_edges(tile, tiles, r, center, start);
+        bool done = turns_taken < MOST_TURNS;
+        // Edges in the last place may be more than there was room for.
+        bool crowded = found_edges > MOST_KEPT;
+        part.end = !done ? start : (crowded ? kept[MOST_KEPT - 1u] & END : END);
+        int center_number = int(min(before_center.x, before_center.y));
+        look(r, part, center_number, start == 0u, center_above, center_seen, sight);
+        sum += light_of_part(r, part, sight);
+        more = crowded && part.end != start;
+        start = part.end;
     }
+    sum += traced(r, part.from, sight.steps);
     return clamp(sum, 0.0, 1.0);
 }
 

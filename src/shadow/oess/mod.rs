@@ -14,6 +14,7 @@
 //! | `map`, `visibility` of `oess.hard` | what sees the line's centre |
 //! | `silhouettes.*`, `boxes`, `start`, `tiles`, `shafts`, `lists`, `through`, `settle` | the edges of each tile: [`super::dbuffer`] |
 //! | `turns` | where edges lie around the line |
+//! | `spans` | which turn around it each edge of a tile's list takes up |
 //! | `visibility` | visibility of tiles with edges |
 //!
 //! With the option `outreach=hull`, and where triangles have holes, edges come from maps of the ends. The edge of a

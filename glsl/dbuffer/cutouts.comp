@@ -93,10 +93,9 @@ void main() {
                     }
                     low = vec3(1.0e38);
                     high = vec3(-1.0e38);
-                    uint fresh = atomicAdd(chunks_used, 1u);
-                    if (fresh >= params.counts.w) {
-                        resume = node;
-                    } else if (count == 0u) {
+                    // What finds no room goes into a chunk that nobody reads, and is counted: overflow.glsl.
+                    uint fresh = min(atomicAdd(chunks_used, 1u), params.counts.w);
+                    if (count == 0u) {
                         first_chunk = fresh;
                     } else {
                         imageStore(pool, chunk_entry_place(chunk, CHUNK), uvec4(fresh));
@@ -104,19 +103,17 @@ void main() {
                     chunk = fresh;
                     slot = 0u;
                 }
-                if (resume == nodes) {
-                    imageStore(pool, chunk_entry_place(chunk, slot), uvec4(triangle));
-                    low = min(low, min(a, min(b, c)));
-                    high = max(high, max(a, max(b, c)));
-                    slot += 1u;
-                    count += 1u;
-                }
+                imageStore(pool, chunk_entry_place(chunk, slot), uvec4(triangle));
+                low = min(low, min(a, min(b, c)));
+                high = max(high, max(a, max(b, c)));
+                slot += 1u;
+                count += 1u;
             }
         }
         node = next;
         resume = steps == MOST_STEPS ? min(resume, node) : resume;
     }
-    if (count > 0u && chunk < params.counts.w) {
+    if (count > 0u) {
         imageStore(chunk_boxes, triangle_texel_place(2u * chunk), vec4(low, 0.0));
         imageStore(chunk_boxes, triangle_texel_place(2u * chunk + 1u), vec4(high, 0.0));
     }

@@ -128,7 +128,6 @@ void main() {
     uint end = max(min(at + BLOCK, silhouettes.count), at);
     uint first_chunk = 0u;
     uint count = 0u;
-    uint resume = end;
     uint chunk = 0u;
     uint slot = CHUNK;
     vec3 low = vec3(1.0e38);
@@ -183,12 +182,9 @@ void main() {
                 }
                 low = vec3(1.0e38);
                 high = vec3(-1.0e38);
-                uint fresh = atomicAdd(chunks_used, 1u);
-                if (fresh >= params.counts.w) {
-                    resume = first + uint(findLSB(listed));
-                    listed = 0u;
-                    at = end;
-                } else if (count == 0u) {
+                // What finds no room goes into a chunk that nobody reads, and is counted: overflow.glsl.
+                uint fresh = min(atomicAdd(chunks_used, 1u), params.counts.w);
+                if (count == 0u) {
                     first_chunk = fresh;
                 } else {
                     imageStore(pool, chunk_entry_place(chunk, CHUNK), uvec4(fresh));
@@ -206,9 +202,9 @@ void main() {
             }
         }
     }
-    if (count > 0u && chunk < params.counts.w) {
+    if (count > 0u) {
         imageStore(chunk_boxes, triangle_texel_place(2u * chunk), vec4(low, 0.0));
         imageStore(chunk_boxes, triangle_texel_place(2u * chunk + 1u), vec4(high, 0.0));
     }
-    imageStore(lists, list_place(block, tile, tiles.x * tiles.y), uvec4(first_chunk, count, resume, end));
+    imageStore(lists, list_place(block, tile, tiles.x * tiles.y), uvec4(first_chunk, count, end, end));
 }

@@ -6,8 +6,8 @@
 // a receiver looks at do not matter to it, and tell so by them.
 //
 // A tile has a list for each block, of places in the list of silhouettes, and one of triangles with holes where the scene has any: chunks of a
-// pool, linked, so that a list may have any length. Where the pool is used up, a list says from which
-// silhouette or node of the hierarchy on it does not know.
+// pool, linked, so that a list may have any length. A list says from which silhouette or node of the hierarchy on it
+// does not know: from the first one if its tile found no room in the pool (overflow.glsl).
 #ifndef ANTUMBRA_DBUFFER_LISTS_GLSL
 #define ANTUMBRA_DBUFFER_LISTS_GLSL
 

@@ -2,6 +2,7 @@
 //! behind each other, balls, under every shape of light that it does.
 
 mod buffer;
+mod overflow;
 mod scenes;
 #[path = "../support/mod.rs"]
 mod support;

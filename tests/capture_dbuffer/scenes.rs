@@ -82,7 +82,7 @@ fn receivers_in_the_plane_of_a_face_are_no_exception() {
 
 /// Many small plates side by side, as one mesh: so many across and down, metres from one to the next, and of them the
 /// part that is no gap.
-fn many_plates(across: u32, pitch: f32, part: f32) -> Primitive {
+pub(crate) fn many_plates(across: u32, pitch: f32, part: f32) -> Primitive {
     let at = |i: u32| (i as f32 - 0.5 * across as f32) * pitch;
     let plates = (0..across * across).map(|i| {
         let [x, z] = [at(i % across), at(i / across)];

@@ -13,6 +13,7 @@ pub type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 pub const SPHERE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/sphere_over_plane.gltf");
 pub const COURT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/sun_court.glb");
+pub const FOLIAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/foliage.glb");
 
 pub fn antumbra() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_antumbra"));

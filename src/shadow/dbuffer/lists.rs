@@ -1,10 +1,11 @@
 //! The passes that find the edges of each tile.
 
 use super::DbufferOptions;
+use super::overflow::Fitting;
 use crate::geometry::{TileList, image_place, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
-    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
+    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassBuilder, PassKind, Stage,
 };
 use crate::shadow::receivers::Receivers;
 use crate::shadow::silhouettes::{Silhouettes, edge_count};
@@ -69,11 +70,41 @@ pub(in crate::shadow) struct Lists {
 
 /// Lists and what they are made in.
 #[derive(Clone, Copy)]
-struct Made {
-    used: BufferId,
-    pool: ImageId,
-    chunk_boxes: ImageId,
-    lists: ImageId,
+pub(super) struct Made {
+    /// Number of chunks that lists have asked for.
+    pub used: BufferId,
+    pub pool: ImageId,
+    pub chunk_boxes: ImageId,
+    pub lists: ImageId,
+    /// Whether lists are in there already.
+    begun: bool,
+}
+
+impl Made {
+    /// Declares that a pass adds lists.
+    fn fill(&self, pass: &mut PassBuilder<'_, '_>) -> Self {
+        let written = Access::StorageWrite(Stage::Compute);
+        let mut fill = |image| match self.begun {
+            true => pass.write(image, written),
+            false => pass.overwrite(image, written),
+        };
+        Self {
+            pool: fill(self.pool),
+            chunk_boxes: fill(self.chunk_boxes),
+            lists: fill(self.lists),
+            used: pass.write(self.used, Access::StorageReadWrite(Stage::Compute)),
+            begun: true,
+        }
+    }
+}
+
+/// The silhouettes that are listed.
+#[derive(Clone, Copy)]
+struct Edges {
+    silhouettes: Silhouettes,
+    ends: ImageId,
+    /// Around as many as [`GROUPS`] says.
+    boxes: [ImageId; 3],
 }
 
 /// What they make.
@@ -121,12 +152,11 @@ impl Lists {
     /// done.
     pub(super) fn add(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>) -> (Found, ImageId) {
         let technique = self.technique;
-        let mut made = self.add_pool(graph, inputs);
-        // Something must be bound.
-        let mut ends = inputs.ids.points;
-        if let Some(silhouettes) = self.silhouettes {
+        let made = self.add_pool(graph, inputs);
+        let edges = self.silhouettes.map(|silhouettes| {
             let desc = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * self.sizes.edges);
-            ends = graph.create_image(format!("{technique}.ends {}", inputs.light_name), desc);
+            let mut ends =
+                graph.create_image(format!("{technique}.ends {}", inputs.light_name), desc);
             let mut boxes: Vec<ImageId> = Vec::new();
             for (level, group) in GROUPS.into_iter().enumerate() {
                 let below = level
@@ -135,13 +165,43 @@ impl Lists {
                 let found = self.add_boxes(graph, inputs, silhouettes, group, below, &mut ends);
                 boxes.push(found);
             }
-            let boxes = [boxes[0], boxes[1], boxes[2]];
-            made = self.add_lists(graph, inputs, silhouettes, ends, boxes, made);
+            Edges {
+                silhouettes,
+                ends,
+                boxes: [boxes[0], boxes[1], boxes[2]],
+            }
+        });
+        let made = self.add_lists(graph, inputs, edges, made, None);
+        let (made, fitting) = self.add_overflow(graph, inputs, made);
+        let made = self.add_lists(graph, inputs, edges, made, Some(fitting));
+        // Something must be bound.
+        let ends = edges.map_or(inputs.ids.points, |edges| edges.ends);
+        self.add_settle(graph, inputs, &made, ends)
+    }
+
+    /// The lists of all tiles, or again those of the tiles that fit.
+    fn add_lists(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        edges: Option<Edges>,
+        mut made: Made,
+        fitting: Option<Fitting>,
+    ) -> Made {
+        if let Some(edges) = edges {
+            made = self.add_edges(graph, inputs, edges, made, fitting);
         }
         if inputs.scene.has_masks() {
-            made = self.add_cutouts(graph, inputs, made);
+            made = self.add_cutouts(graph, inputs, made, fitting);
         }
-        self.add_settle(graph, inputs, &made, ends)
+        made
+    }
+
+    /// What is in names of passes that make lists, and the tiles that they are of.
+    fn round(&self, fitting: Option<Fitting>) -> (&'static str, TileList) {
+        fitting.map_or(("", self.receivers.list), |fitting| {
+            (".again", fitting.tiles)
+        })
     }
 
     fn add_boxes(
@@ -211,9 +271,11 @@ impl Lists {
         let used = pass.overwrite(used, Access::Clear);
         pass.record(move |ctx| ctx.update_buffer(used, 0, &[0; 16]));
 
-        let pool = texels(vk::Format::R32_UINT, self.sizes.chunks * CHUNK_TEXELS);
+        // And a chunk for all that finds no room.
+        let chunks = self.sizes.chunks + 1;
+        let pool = texels(vk::Format::R32_UINT, chunks * CHUNK_TEXELS);
         let pool = graph.create_image(format!("{technique}.pool {name}"), pool);
-        let boxed = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * self.sizes.chunks);
+        let boxed = texels(vk::Format::R32G32B32A32_SFLOAT, 2 * chunks);
         let chunk_boxes = graph.create_image(format!("{technique}.chunk_boxes {name}"), boxed);
         let desc = texels(
             vk::Format::R32G32B32A32_UINT,
@@ -225,28 +287,35 @@ impl Lists {
             pool,
             chunk_boxes,
             lists,
+            begun: false,
         }
     }
 
-    fn add_lists(
+    fn add_edges(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        silhouettes: Silhouettes,
-        ends: ImageId,
-        boxes: [ImageId; 3],
+        found: Edges,
         made: Made,
+        fitting: Option<Fitting>,
     ) -> Made {
         let (technique, name) = (self.technique, &inputs.light_name);
         let [across, down] = tile_counts(inputs.camera.size());
         let blocks = self.sizes.blocks;
-        let (params, shafts, tiles) = (self.params, self.shafts, self.receivers.list);
+        let (params, shafts) = (self.params, self.shafts);
+        let (round, tiles) = self.round(fitting);
+        let Edges {
+            silhouettes,
+            ends,
+            boxes,
+        } = found;
         let Silhouettes {
             list: numbers,
             arguments,
         } = silhouettes;
         let (edges, points) = (inputs.ids.edges, inputs.ids.points);
-        let mut pass = graph.pass(format!("{technique}.lists {name}"), PassKind::Compute);
+        let pass = format!("{technique}.lists{round} {name}");
+        let mut pass = graph.pass(pass, PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
         pass.read(arguments, Access::Uniform(Stage::Compute));
         let read = [shafts, ends, numbers, edges, points];
@@ -254,10 +323,7 @@ impl Lists {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         tiles.read(&mut pass);
-        let used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
-        let pool = pass.overwrite(made.pool, Access::StorageWrite(Stage::Compute));
-        let lists = pass.overwrite(made.lists, Access::StorageWrite(Stage::Compute));
-        let chunk_boxes = pass.overwrite(made.chunk_boxes, Access::StorageWrite(Stage::Compute));
+        let made = made.fill(&mut pass);
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -270,49 +336,46 @@ impl Lists {
                 Bind::sampled(6, boxes[0], nearest),
                 Bind::sampled(7, boxes[1], nearest),
                 Bind::sampled(8, boxes[2], nearest),
-                Bind::storage_buffer(9, used),
-                Bind::storage_image(10, pool),
-                Bind::storage_image(11, lists),
-                Bind::storage_image(12, chunk_boxes),
+                Bind::storage_buffer(9, made.used),
+                Bind::storage_image(10, made.pool),
+                Bind::storage_image(11, made.lists),
+                Bind::storage_image(12, made.chunk_boxes),
                 Bind::sampled(13, numbers, nearest),
                 Bind::sampled(14, edges, nearest),
                 Bind::sampled(15, points, nearest),
             ];
             let shader = &spirv::DBUFFER_LISTS_COMP;
             ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
+            if let Some(fitting) = fitting {
+                return fitting.dispatch_lists(ctx);
+            }
             let [groups, ..] = shader.groups([across * down, 1, 1]);
             ctx.dispatch([blocks, groups, 1]);
             Ok(())
         });
-        Made {
-            used,
-            pool,
-            chunk_boxes,
-            lists,
-        }
+        made
     }
 
-    fn add_cutouts(&self, graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, made: Made) -> Made {
+    fn add_cutouts(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        made: Made,
+        fitting: Option<Fitting>,
+    ) -> Made {
         let (technique, name) = (self.technique, &inputs.light_name);
         let [across, down] = tile_counts(inputs.camera.size());
-        let (params, shafts, tiles) = (self.params, self.shafts, self.receivers.list);
+        let (params, shafts) = (self.params, self.shafts);
+        let (round, tiles) = self.round(fitting);
         let (triangles, hierarchy) = (inputs.ids.triangles, inputs.ids.hierarchy);
-        let mut pass = graph.pass(format!("{technique}.cutouts {name}"), PassKind::Compute);
+        let pass = format!("{technique}.cutouts{round} {name}");
+        let mut pass = graph.pass(pass, PassKind::Compute);
         pass.read(params, Access::Uniform(Stage::Compute));
         for image in [shafts, triangles, hierarchy] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         tiles.read(&mut pass);
-        let used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
-        let images = [made.pool, made.lists, made.chunk_boxes];
-        let [pool, lists, chunk_boxes] = images.map(|image| {
-            let written = Access::StorageWrite(Stage::Compute);
-            // Lists of silhouettes come before, if there are any.
-            match self.silhouettes {
-                Some(_) => pass.write(image, written),
-                None => pass.overwrite(image, written),
-            }
-        });
+        let made = made.fill(&mut pass);
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -322,22 +385,20 @@ impl Lists {
                 Bind::sampled(3, shafts, nearest),
                 Bind::sampled(4, triangles, nearest),
                 Bind::sampled(5, hierarchy, nearest),
-                Bind::storage_buffer(6, used),
-                Bind::storage_image(7, pool),
-                Bind::storage_image(8, lists),
-                Bind::storage_image(9, chunk_boxes),
+                Bind::storage_buffer(6, made.used),
+                Bind::storage_image(7, made.pool),
+                Bind::storage_image(8, made.lists),
+                Bind::storage_image(9, made.chunk_boxes),
             ];
             let shader = &spirv::DBUFFER_CUTOUTS_COMP;
             ctx.bind_compute(&ComputePipelineDesc::new(shader), &bindings, &[])?;
+            if let Some(fitting) = fitting {
+                return fitting.tiles.dispatch(ctx);
+            }
             ctx.dispatch(shader.groups([across * down, 1, 1]));
             Ok(())
         });
-        Made {
-            used,
-            pool,
-            chunk_boxes,
-            lists,
-        }
+        made
     }
 
     fn add_settle(

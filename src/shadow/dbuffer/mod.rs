@@ -19,6 +19,9 @@
 //! | `start`, `tiles`, `shafts` | tiles that some of the light is above, what is between both |
 //! | `lists` | the edges of each tile, in chunks with boxes around them |
 //! | `cutouts` | its triangles with holes, if the scene has any: these hide samples of the light |
+//! | `overflow` | whether lists have found no room: if all have some, the next passes up to `settle` run over nothing |
+//! | `demand`, `fit` | empty lists; the tiles that ask for the least, as many as there is room for |
+//! | `lists.again`, `cutouts.again` | the lists of these tiles |
 //! | `through` | whether a surface cuts through the light: then rays to samples of it decide, as in tiles with very many edges |
 //! | `settle` | tiles without edges; a list of the others |
 //! | `visibility` | visibility of the others |
@@ -26,6 +29,7 @@
 mod buffer;
 mod lists;
 mod options;
+mod overflow;
 mod samples;
 
 pub use options::{Buffer, Curve, DbufferOptions, Keep};

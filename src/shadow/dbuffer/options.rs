@@ -41,8 +41,9 @@ pub enum Curve {
 pub struct DbufferOptions {
     /// Places on the light at which layers are counted: 32 or 64; for [`Buffer::Lists`].
     pub samples: u32,
-    /// Edges a tile that lists have room for on average, 0 to 4096. What finds no room is looked for
-    /// in the whole list of silhouettes, which costs time. For [`Buffer::Lists`].
+    /// Edges a tile that lists have room for on average, 0 to 4096. Where tiles ask for more, those with the
+    /// most edges go without: receivers look through the whole list of silhouettes, or send rays where that is
+    /// longer than [`most_edges`](Self::most_edges). For [`Buffer::Lists`].
     pub room: u32,
     /// Most edges of a tile, 0 to 2048: receivers of tiles with more send rays to the samples, so that
     /// loops stay shorter than software drivers let them be. For [`Buffer::Lists`].
@@ -114,7 +115,7 @@ impl DbufferOptions {
             "room",
             "256",
             "0 to 4096",
-            "edges a tile that lists have room for; the rest is looked for among all",
+            "edges a tile that lists have room for on average; if that is too few, tiles with the most go without",
         ),
         TechniqueOption::new(
             "most-edges",

@@ -26,7 +26,9 @@ void main() {
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
     uint tile = texelFetch(list, tile_entry_place(index, tiles), 0).x;
     uint demand = 0u;
-    for (uint block = 0u; block < params.sizes.y; ++block) {
+    // No loop that ends by a uniform alone: blocks_of in entries.glsl.
+    uint count = tile < tiles.x * tiles.y ? params.sizes.y : 0u;
+    for (uint block = 0u; block < count; ++block) {
         ivec2 place = list_place(block, tile, tiles.x * tiles.y);
         uvec4 found = imageLoad(lists, place);
         demand += (found.y + CHUNK - 1u) / CHUNK;

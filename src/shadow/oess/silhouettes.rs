@@ -14,7 +14,7 @@ use ash::vk;
 /// these rays, and all loops together stay below the turns after which software drivers end them.
 const MOST_EDGES: u32 = 6144;
 
-/// Edges a tile that lists have room for on average: what finds none depends on which tile was first.
+/// Edges a tile that lists have room for on average: of more, the tiles with the most go without.
 const ROOM: u32 = 512;
 
 /// Texels of a chunk in the image of spans, and spans of a texel: `oess/turns.glsl`.

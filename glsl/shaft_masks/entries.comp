@@ -285,7 +285,7 @@ void main() {
         uint i = lane;
         do {
             bool is_listed = i < end;
-            uint triangle = is_listed ? texelFetch(pool, chunk_entry_place(chunk, i), 0).x : 0u;
+            uint triangle = is_listed ? texelFetch(pool, chunk_place(chunk, i), 0)[i % 4u] : 0u;
             Triangle t = fetch_triangle(triangle);
             if (is_listed && meets(shaft, t)) {
                 bool between = is_whole(surfaces, t);
@@ -326,7 +326,7 @@ void main() {
             }
             i += gl_WorkGroupSize.x;
         } while (i < corners);
-        chunk = texelFetch(pool, chunk_entry_place(chunk, CHUNK), 0).x;
+        chunk = texelFetch(pool, chunk_place(chunk, CHUNK), 0).x;
         turn += 1u;
         begin += CHUNK;
     } while (begin < candidates.y);

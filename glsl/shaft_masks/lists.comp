@@ -10,7 +10,7 @@
 #include "shaft_masks/lists.glsl"
 #include "shaft_masks/walk.glsl"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = PARTS_A_GROUP) in;
 
 layout(set = 0, binding = 0, std140) uniform ViewBlock {
     ViewParams view;
@@ -32,7 +32,7 @@ layout(set = 0, binding = 8, r32ui) uniform writeonly uimage2D penumbra_list;
 layout(set = 0, binding = 9, std430) buffer Pool {
     uint chunks_used;
 };
-layout(set = 0, binding = 10, r32ui) uniform writeonly uimage2D pool;
+layout(set = 0, binding = 10, rgba32ui) uniform writeonly uimage2D pool;
 layout(set = 0, binding = 11, rgba32ui) uniform writeonly uimage2D lists;
 layout(set = 0, binding = 12, r32ui) uniform writeonly uimage2D estimates;
 
@@ -55,30 +55,26 @@ vec4 fetch_shaft_texel(ivec2 place) {
 // Where a tile's list goes on.
 struct List {
     uint first; // its first chunk
-    uint count;
     uint chunk; // its last one
-    uint slot;
+    uint count;
     bool complete;
 };
 
-// Puts a triangle into the list.
-void list_triangle(inout List list, uint triangle) {
-    if (list.slot == CHUNK) {
-        uint fresh = atomicAdd(chunks_used, 1u);
-        if (fresh >= params.counts.w) {
-            list.complete = false;
-        } else if (list.count == 0u) {
-            list.first = fresh;
-        } else {
-            imageStore(pool, chunk_entry_place(list.chunk, CHUNK), uvec4(fresh));
-        }
-        list.chunk = fresh;
-        list.slot = 0u;
-    }
+// Puts a chunk into the list, of whose triangles so many count: all but in the last one.
+void list_chunk(inout List list, uint triangles[CHUNK], uint count) {
+    uint fresh = atomicAdd(chunks_used, 1u);
+    list.complete = fresh < params.counts.w;
     if (list.complete) {
-        imageStore(pool, chunk_entry_place(list.chunk, list.slot), uvec4(triangle));
-        list.slot += 1u;
-        list.count += 1u;
+        for (uint i = 0u; i < CHUNK; i += 4u) {
+            uvec4 four = uvec4(triangles[i], triangles[i + 1u], triangles[i + 2u], triangles[i + 3u]);
+            imageStore(pool, chunk_place(fresh, i), four);
+        }
+        if (list.count > 0u) {
+            imageStore(pool, chunk_place(list.chunk, CHUNK), uvec4(fresh));
+        }
+        list.first = list.count == 0u ? fresh : list.first;
+        list.count += count;
+        list.chunk = fresh;
     }
 }
 
@@ -94,12 +90,12 @@ void main() {
     Surfaces surfaces = fetch_surfaces(part, view.light);
 
     uint nodes = params.counts.z;
-    List found = List(0u, 0u, 0u, CHUNK, true);
+    List found = List(0u, 0u, 0u, true);
     bool any_cancels = false;
-    // Triangles wait here, in registers, until there are some to list: a vector goes through what stores them whenever
-    // one of its lanes may have any.
-    uint waiting[SHORT_LIST];
-    for (uint i = 0u; i < SHORT_LIST; ++i) {
+    // Triangles wait here until there is a chunk of them. Invocations of a vector wait for each other then, so that the
+    // fewer stops a walk makes the better.
+    uint waiting[CHUNK];
+    for (uint i = 0u; i < CHUNK; ++i) {
         waiting[i] = 0u;
     }
     uint count = 0u;
@@ -107,20 +103,15 @@ void main() {
     uint steps = 0u;
     bool more = true;
     while (more) {
-        while (count > 0u && found.complete) {
-            list_triangle(found, waiting[0]);
-            for (uint i = 1u; i < SHORT_LIST; ++i) {
-                waiting[i - 1u] = waiting[i];
-            }
-            count -= 1u;
+        if (count == CHUNK) {
+            list_chunk(found, waiting, count);
+            count = 0u;
         }
-        while (node < nodes && count < SHORT_LIST && steps < MOST_STEPS) {
+        while (node < nodes && count < CHUNK && steps < MOST_STEPS) {
             Step step = step_at(shaft, surfaces, node);
             any_cancels = any_cancels || step.cancels;
             node = step.next;
-            for (uint i = 0u; i < SHORT_LIST; ++i) {
-                waiting[i] = step.is_met && i == count ? step.triangle : waiting[i];
-            }
+            waiting[count] = step.triangle; // counts if the next line says so
             count += step.is_met ? 1u : 0u;
             steps += 1u;
         }
@@ -128,19 +119,18 @@ void main() {
         more = found.complete && node < nodes;
     }
 
-    bool is_short = found.complete && found.count == 0u && !any_cancels && shaft.low.w > 0.0;
+    uint short_list[SHORT_LIST];
+    for (uint i = 0u; i < SHORT_LIST; ++i) {
+        short_list[i] = waiting[i];
+    }
+    bool is_short = found.complete && count <= SHORT_LIST && found.count == 0u && !any_cancels && shaft.low.w > 0.0;
     vec3 some = fetch_some_surface(part);
-    bool lit = is_short && !any_hides(view.light, surfaces, shaft, some, waiting, is_short ? count : 0u);
+    bool lit = is_short && !any_hides(view.light, surfaces, shaft, some, short_list, is_short ? count : 0u);
     if (lit) {
         imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(LEVEL_LIT)); // as all is at the beginning
-        count = 0u;
     }
-    while (count > 0u && found.complete) {
-        list_triangle(found, waiting[0]);
-        for (uint i = 1u; i < SHORT_LIST; ++i) {
-            waiting[i - 1u] = waiting[i];
-        }
-        count -= 1u;
+    if (!lit && count > 0u && found.complete) {
+        list_chunk(found, waiting, count);
     }
     if (!lit) {
         uint at = atomicAdd(penumbra.count, 1u);

@@ -13,8 +13,8 @@
 
 #include "common/triangles.glsl"
 
-// Entries of a chunk of candidates; the one after them is the number of the list's next chunk.
-const uint CHUNK = 31u;
+// Candidates of a chunk, four a texel; the texel after them is the number of the list's next chunk.
+const uint CHUNK = 32u;
 
 layout(constant_id = 4) const uint TASK_ENTRIES = 512u;
 
@@ -48,8 +48,9 @@ ivec2 task_place(uint task) {
     return triangle_texel_place(task);
 }
 
-ivec2 chunk_entry_place(uint chunk, uint entry) {
-    return triangle_texel_place(chunk * (CHUNK + 1u) + entry);
+// The texel with a candidate, or for CHUNK with the next chunk.
+ivec2 chunk_place(uint chunk, uint candidate) {
+    return triangle_texel_place(chunk * (CHUNK / 4u + 1u) + candidate / 4u);
 }
 
 // An edge in its pool: a triangle, the corner that it begins at, and which way it counts.

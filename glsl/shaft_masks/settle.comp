@@ -9,7 +9,7 @@
 #include "shaft_masks/lists.glsl"
 #include "shaft_masks/walk.glsl"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = PARTS_A_GROUP) in;
 
 layout(set = 0, binding = 0, std140) uniform ViewBlock {
     ViewParams view;
@@ -86,6 +86,7 @@ void main() {
         imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(dark ? LEVEL_DARK : LEVEL_LIT));
     } else {
         uint at = atomicAdd(rest.count, 1u);
+        atomicMax(rest.groups_x, at / PARTS_A_GROUP + 1u);
         imageStore(rest_list, tile_entry_place(at, tiles), uvec4(entry));
     }
     vec2 depths = fetch_part_depths(part);

@@ -14,6 +14,9 @@ const uint SHAFT_PLANES = 7u;
 // Texels of a tile's shaft, side by side: planes, box, box of its surfaces, space between, normals.
 const uint SHAFT_TEXELS = SHAFT_PLANES + 10u;
 
+// Invocations of a workgroup where each takes a tile or a part of one.
+const uint PARTS_A_GROUP = 64u;
+
 // Rounding of positions, as a part of the largest coordinate: a few units of the last place. What is
 // nearer to a surface than that does not block its light.
 const float POSITION_ROUNDING = 1.0 / 2097152.0;

@@ -91,6 +91,12 @@ impl TileList {
         self.tiles = pass.overwrite(self.tiles, Access::StorageWrite(Stage::Compute));
     }
 
+    /// Declares that another compute pass adds tiles after one that fills the list.
+    pub fn extend(&mut self, pass: &mut PassBuilder<'_, '_>) {
+        self.arguments = pass.write(self.arguments, Access::StorageReadWrite(Stage::Compute));
+        self.tiles = pass.write(self.tiles, Access::StorageWrite(Stage::Compute));
+    }
+
     /// Declares that a compute pass is dispatched over the list.
     pub fn read(&self, pass: &mut PassBuilder<'_, '_>) {
         pass.read(self.arguments, Access::Indirect);
@@ -98,7 +104,8 @@ impl TileList {
         pass.read(self.tiles, Access::Sampled(Stage::Compute));
     }
 
-    /// Dispatches the bound pipeline, one workgroup for each tile of the list.
+    /// Dispatches the bound pipeline with as many workgroups as those who added tiles asked for: one for each tile, or
+    /// for some.
     pub fn dispatch(&self, ctx: &mut PassContext<'_>) -> Result<(), GpuError> {
         ctx.dispatch_indirect(self.arguments, 0)
     }

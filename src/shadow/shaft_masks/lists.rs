@@ -1,6 +1,6 @@
 //! The passes that find what is between tiles and the light.
 
-use super::{LIST_TEXELS, Lists, Made, NAME, PARTS, POOL_WIDTH, Sizes, masks, part_list, texels};
+use super::{CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, PARTS, POOL_WIDTH, Sizes, masks, part_list, texels};
 use crate::geometry::{TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
@@ -59,7 +59,6 @@ impl Making {
         made: Made,
     ) -> (TileList, Made) {
         let name = &inputs.light_name;
-        let [across, down] = tile_counts(inputs.camera.size());
         let (params, shafts) = (self.params, self.shafts);
         let mut rest = part_list(graph, inputs, "rest");
         let mut pass = graph.pass(format!("{NAME}.no_rest {name}"), PassKind::Transfer);
@@ -102,8 +101,7 @@ impl Making {
                 ..ComputePipelineDesc::new(shader)
             };
             ctx.bind_compute(&pipeline, &bindings, &[])?;
-            ctx.dispatch(shader.groups([across * down * PARTS, 1, 1]));
-            Ok(())
+            parts.dispatch(ctx)
         });
         let made = Made {
             visibility,
@@ -156,7 +154,8 @@ impl Making {
             Ok(())
         });
 
-        let pool = texels(vk::Format::R32_UINT, sizes.pool_rows * POOL_WIDTH);
+        let format = vk::Format::R32G32B32A32_UINT;
+        let pool = texels(format, sizes.chunks() * CHUNK_TEXELS);
         let pool = graph.create_image(format!("{NAME}.pool {name}"), pool);
         let format = vk::Format::R32G32B32A32_UINT;
         let desc = ImageDesc::new(format, across * LIST_TEXELS, down * PARTS);
@@ -199,8 +198,7 @@ impl Making {
                 ..ComputePipelineDesc::new(shader)
             };
             ctx.bind_compute(&pipeline, &bindings, &[])?;
-            ctx.dispatch(shader.groups([across * down * PARTS, 1, 1]));
-            Ok(())
+            rest.dispatch(ctx)
         });
         let candidates = Candidates {
             tiles: penumbra,

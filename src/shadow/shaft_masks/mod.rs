@@ -15,7 +15,7 @@
 //! |---|---|
 //! | `params` | rows of samples |
 //! | `start`, `tiles` | the picture's tiles that some of the light is above |
-//! | `shafts` | the tiles, in two parts where they span a gap in depth; their shafts, and boxes around their surfaces |
+//! | `shafts`, `shafts_rough` | the tiles, in two parts where they span a gap in depth; their shafts, and boxes around their surfaces |
 //! | `no_rest`, `settle` | lit and dark tiles settled, as far as a short walk tells |
 //! | `lists` | more lit tiles settled; candidates of the others |
 //! | `entries` | more lit tiles and dark ones settled; edges and triangles of the others |
@@ -63,8 +63,11 @@ const SHAFT_TEXELS: u32 = 17;
 /// `LIST_TEXELS` in `shaft_masks/lists.glsl`.
 const LIST_TEXELS: u32 = 3;
 
-/// Texels of a chunk of a list: `CHUNK` + 1 in `shaft_masks/lists.glsl`.
-const CHUNK_TEXELS: u32 = 32;
+/// Triangles of a chunk of a list: `CHUNK` in `shaft_masks/lists.glsl`.
+const CHUNK: u32 = 32;
+
+/// Its texels: four triangles each, and one more.
+const CHUNK_TEXELS: u32 = CHUNK / 4 + 1;
 
 /// Width of the image that holds the lists: `TRIANGLE_IMAGE_WIDTH` in `common/triangles.glsl`.
 const POOL_WIDTH: u32 = 4096;
@@ -140,7 +143,7 @@ impl Sizes {
     }
 
     fn chunks(&self) -> u32 {
-        self.pool_rows * POOL_WIDTH / CHUNK_TEXELS
+        self.pool_rows * POOL_WIDTH / CHUNK
     }
 }
 
@@ -283,44 +286,73 @@ pub(super) fn add_shafts(
     let (view_params, part) = inputs.view_params;
     let tiles = receivers.list;
     let mut parts = part_list(graph, inputs, "parts");
+    let size = inputs.camera.size();
+    let mut rough = TileList::create(graph, &format!("{technique}.rough {name}"), size);
     let mut pass = graph.pass(format!("{technique}.begin {name}"), PassKind::Transfer);
     parts.clear(&mut pass);
-    let cleared = parts;
-    pass.record(move |ctx| cleared.record_clear(ctx));
+    rough.clear(&mut pass);
+    let cleared = [parts, rough];
+    pass.record(move |ctx| cleared.iter().try_for_each(|list| list.record_clear(ctx)));
     let shape = shape_number(&inputs.light.shape);
-    let mut pass = graph.pass(format!("{technique}.shafts {name}"), PassKind::Compute);
-    pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
-    pass.read(params, Access::Uniform(Stage::Compute));
     let tile_bounds = inputs.tile_bounds;
-    for image in [gbuffer.view_depth, gbuffer.ids, triangles, tile_bounds] {
-        pass.read(image, Access::Sampled(Stage::Compute));
-    }
-    tiles.read(&mut pass);
-    parts.fill(&mut pass);
-    let shafts = pass.overwrite(shafts, Access::StorageWrite(Stage::Compute));
-    pass.record(move |ctx| {
-        let nearest = SamplerDesc::nearest();
-        let bindings = [
-            Bind::uniform(0, view_params).part(part),
-            Bind::uniform(1, params),
-            Bind::sampled(2, gbuffer.view_depth, nearest),
-            Bind::sampled(3, gbuffer.ids, nearest),
-            Bind::sampled(4, triangles, nearest),
-            Bind::uniform(5, tiles.arguments),
-            Bind::sampled(6, tiles.tiles, nearest),
-            Bind::storage_image(7, shafts),
-            Bind::storage_buffer(8, parts.arguments),
-            Bind::storage_image(9, parts.tiles),
-            Bind::sampled(10, tile_bounds, nearest),
-        ];
-        let shader = &spirv::SHAFT_MASKS_SHAFTS_COMP;
-        let pipeline = ComputePipelineDesc {
-            constants: vec![(0, shape), (2, most_parts)],
-            ..ComputePipelineDesc::new(shader)
+    let images = [gbuffer.view_depth, gbuffer.ids, triangles, tile_bounds];
+    // Those of tiles with one triangle, then the others.
+    let mut made = shafts;
+    for is_rough in [false, true] {
+        let (listed, what) = match is_rough {
+            false => (tiles, "shafts"),
+            true => (rough, "shafts_rough"),
         };
-        ctx.bind_compute(&pipeline, &bindings, &[])?;
-        ctx.dispatch(shader.groups([across * down, 1, 1]));
-        Ok(())
-    });
-    (shafts, parts)
+        let mut pass = graph.pass(format!("{technique}.{what} {name}"), PassKind::Compute);
+        pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+        pass.read(params, Access::Uniform(Stage::Compute));
+        for image in images {
+            pass.read(image, Access::Sampled(Stage::Compute));
+        }
+        listed.read(&mut pass);
+        if is_rough {
+            parts.extend(&mut pass);
+            made = pass.write(made, Access::StorageWrite(Stage::Compute));
+        } else {
+            parts.fill(&mut pass);
+            rough.fill(&mut pass);
+            made = pass.overwrite(made, Access::StorageWrite(Stage::Compute));
+        }
+        let (shafts, rough) = (made, rough);
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let mut bindings = vec![
+                Bind::uniform(0, view_params).part(part),
+                Bind::uniform(1, params),
+                Bind::sampled(2, gbuffer.view_depth, nearest),
+                Bind::sampled(3, gbuffer.ids, nearest),
+                Bind::sampled(4, triangles, nearest),
+                Bind::uniform(5, listed.arguments),
+                Bind::sampled(6, listed.tiles, nearest),
+                Bind::storage_image(7, shafts),
+                Bind::storage_buffer(8, parts.arguments),
+                Bind::storage_image(9, parts.tiles),
+                Bind::sampled(10, tile_bounds, nearest),
+            ];
+            let shader = match is_rough {
+                false => &spirv::SHAFT_MASKS_SHAFTS_COMP,
+                true => &spirv::SHAFT_MASKS_ROUGH_COMP,
+            };
+            if !is_rough {
+                bindings.push(Bind::storage_buffer(11, rough.arguments));
+                bindings.push(Bind::storage_image(12, rough.tiles));
+            }
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(0, shape), (2, most_parts)],
+                ..ComputePipelineDesc::new(shader)
+            };
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            if is_rough {
+                return listed.dispatch(ctx);
+            }
+            ctx.dispatch(shader.groups([across * down, 1, 1]));
+            Ok(())
+        });
+    }
+    (made, parts)
 }

@@ -24,17 +24,17 @@ layout(set = 0, binding = 0, std140) uniform ViewBlock {
 layout(set = 0, binding = 1, std140) uniform ShaftBlock {
     ShaftParams params;
 };
-layout(set = 0, binding = 2) uniform sampler2D view_depth;
-layout(set = 0, binding = 3) uniform usampler2D ids;
-layout(set = 0, binding = 4) uniform sampler2D triangles;
+layout(set = 0, binding = 2, r32f) uniform readonly image2D view_depth;
+layout(set = 0, binding = 3, r32ui) uniform readonly uimage2D ids;
+layout(set = 0, binding = 4, rgba32f) uniform readonly image2D triangles;
 layout(set = 0, binding = 5, std140) uniform Arguments {
     TileArguments arguments;
 };
 layout(set = 0, binding = 6) uniform usampler2D list;
-layout(set = 0, binding = 7) uniform sampler2D shafts;
-layout(set = 0, binding = 8) uniform usampler2D edge_pool;
-layout(set = 0, binding = 9) uniform usampler2D triangle_pool;
-layout(set = 0, binding = 10) uniform usampler2D lists;
+layout(set = 0, binding = 7, rgba32f) uniform readonly image2D shafts;
+layout(set = 0, binding = 8, r32ui) uniform readonly uimage2D edge_pool;
+layout(set = 0, binding = 9, r32ui) uniform readonly uimage2D triangle_pool;
+layout(set = 0, binding = 10, rgba32ui) uniform readonly uimage2D lists;
 layout(set = 0, binding = 11, r32f) uniform writeonly image2D error_bound;
 layout(set = 0, binding = 12, r32ui) uniform uimage2D estimates;
 
@@ -45,11 +45,11 @@ layout(set = 0, binding = 12, r32ui) uniform uimage2D estimates;
 #include "shaft_masks/masks.glsl"
 
 vec4 fetch_triangle_texel(uint texel) {
-    return texelFetch(triangles, triangle_texel_place(texel), 0);
+    return imageLoad(triangles, triangle_texel_place(texel));
 }
 
 vec4 fetch_shaft_texel(ivec2 place) {
-    return texelFetch(shafts, place, 0);
+    return imageLoad(shafts, place);
 }
 
 // Nothing is fetched from these here.
@@ -201,18 +201,18 @@ void main() {
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
     uvec2 part = part_of_entry(texelFetch(list, tile_entry_place(index, tiles), 0).x, tiles);
     ivec2 at = list_place(part);
-    uvec4 stored = texelFetch(lists, at, 0);
-    Entries entries = entries_of(texelFetch(lists, at + ivec2(1, 0), 0), texelFetch(lists, at + ivec2(2, 0), 0));
+    uvec4 stored = imageLoad(lists, at);
+    Entries entries = entries_of(imageLoad(lists, at + ivec2(1, 0)), imageLoad(lists, at + ivec2(2, 0)));
     uvec2 pixel = tile_of_part(part, tiles) * TILE_SIZE + gl_LocalInvocationID.xy;
     uvec2 within = min(pixel, params.counts.xy - 1u);
-    float depth = texelFetch(view_depth, ivec2(within), 0).x;
+    float depth = imageLoad(view_depth, ivec2(within)).x;
     // Tiles that were worked on again have a bound of their own.
     bool is_last = imageLoad(estimates, estimate_place(part, ESTIMATE_LEVEL)).x == params.pattern.w;
     if (!is_last || depth <= 0.0 || !is_in_part(fetch_part_depths(part), depth)) {
         return;
     }
     vec3 ray = pixel_ray(view.camera, within);
-    uint id = texelFetch(ids, ivec2(within), 0).x;
+    uint id = imageLoad(ids, ivec2(within)).x;
     vec3 p = view.camera.eye.xyz + depth * ray;
     MaskReceiver receiver = MaskReceiver(p + way_into_triangle(p, id), id, true);
     LightFrom light = light_from(view.light, receiver.position);
@@ -233,7 +233,7 @@ void main() {
         uvec2 inner;
         cells_of_line(above, cells, inner);
         for (uint i = 0u; i < entries.edges; ++i) {
-            uint code = texelFetch(edge_pool, triangle_texel_place(entries.first_edge + i), 0).x;
+            uint code = imageLoad(edge_pool, triangle_texel_place(entries.first_edge + i)).x;
             uint triangle = (code & ~(EDGE_DOUBLE | EDGE_TURNED)) >> EDGE_CORNER_BITS;
             uint corner = code & ((1u << EDGE_CORNER_BITS) - 1u);
             vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
@@ -241,7 +241,7 @@ void main() {
             cells |= cells_of_edge(project(projection, a), project(projection, b));
         }
         for (uint i = 0u; i < entries.whole; ++i) {
-            uint triangle = texelFetch(triangle_pool, triangle_texel_place(entries.first + i), 0).x;
+            uint triangle = imageLoad(triangle_pool, triangle_texel_place(entries.first + i)).x;
             vec2 a = project(projection, fetch_triangle_texel(4u * triangle).xyz);
             vec2 b = project(projection, fetch_triangle_texel(4u * triangle + 1u).xyz);
             vec2 c = project(projection, fetch_triangle_texel(4u * triangle + 2u).xyz);
@@ -249,7 +249,7 @@ void main() {
         }
         for (uint i = 0u; i < entries.others; ++i) {
             uint place = entries.first + entries.room - 1u - i;
-            Blocker blocker = fetch_blocker(texelFetch(triangle_pool, triangle_texel_place(place), 0).x);
+            Blocker blocker = fetch_blocker(imageLoad(triangle_pool, triangle_texel_place(place)).x);
             cells |= cells_of_blocker(receiver, light, blocker);
         }
         undecided += bitCount(cells.x) + bitCount(cells.y);

@@ -28,14 +28,14 @@ layout(set = 0, binding = 0, std140) uniform ViewBlock {
 layout(set = 0, binding = 1, std140) uniform ShaftBlock {
     ShaftParams params;
 };
-layout(set = 0, binding = 3) uniform sampler2D triangles;
-layout(set = 0, binding = 4) uniform usampler2D neighbours;
+layout(set = 0, binding = 3, rgba32f) uniform readonly image2D triangles;
+layout(set = 0, binding = 4, rgba32ui) uniform readonly uimage2D neighbours;
 layout(set = 0, binding = 5, std140) uniform Arguments {
     TileArguments arguments;
 };
 layout(set = 0, binding = 6) uniform usampler2D list;
-layout(set = 0, binding = 7) uniform sampler2D shafts;
-layout(set = 0, binding = 8) uniform usampler2D pool;
+layout(set = 0, binding = 7, rgba32f) uniform readonly image2D shafts;
+layout(set = 0, binding = 8, rgba32ui) uniform readonly uimage2D pool;
 layout(set = 0, binding = 9, rgba32ui) uniform uimage2D lists;
 layout(set = 0, binding = 10, std430) buffer Used {
     uint chunks_used;
@@ -45,7 +45,7 @@ layout(set = 0, binding = 10, std430) buffer Used {
 layout(set = 0, binding = 11, r32ui) uniform writeonly uimage2D edge_pool;
 layout(set = 0, binding = 12, r32ui) uniform writeonly uimage2D triangle_pool;
 layout(set = 0, binding = 13, r32f) uniform writeonly image2D visibility;
-layout(set = 0, binding = 14) uniform sampler2D view_depth;
+layout(set = 0, binding = 14, r32f) uniform readonly image2D view_depth;
 layout(set = 0, binding = 15, std430) buffer TaskArguments {
     TileArguments further;
 };
@@ -95,7 +95,7 @@ shared uint cover_count;
 shared uint seen_corners[MOST_COVERS]; // of the surfaces' box, that see some of the light past it
 
 vec4 fetch_triangle_texel(uint texel) {
-    return texelFetch(triangles, triangle_texel_place(texel), 0);
+    return imageLoad(triangles, triangle_texel_place(texel));
 }
 
 vec4 fetch_node_texel(ivec2 place) {
@@ -103,7 +103,7 @@ vec4 fetch_node_texel(ivec2 place) {
 }
 
 vec4 fetch_shaft_texel(ivec2 place) {
-    return texelFetch(shafts, place, 0);
+    return imageLoad(shafts, place);
 }
 
 // Nothing is fetched from these here.
@@ -212,7 +212,7 @@ void stage_edge(Shaft shaft, bool one_axis, vec3 a, vec3 b, uint code) {
 
 // The edge of a counted triangle that begins at a corner.
 void add_edge(Shaft shaft, Surfaces surfaces, uint triangle, uint corner, uint side) {
-    uint beside = texelFetch(neighbours, triangle_texel_place(triangle), 0)[corner];
+    uint beside = imageLoad(neighbours, triangle_texel_place(triangle))[corner];
     vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
     vec3 b = fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
     bool alone = beside == NO_NEIGHBOUR;
@@ -285,7 +285,7 @@ void main() {
         uint i = lane;
         do {
             bool is_listed = i < end;
-            uint triangle = is_listed ? texelFetch(pool, chunk_place(chunk, i), 0)[i % 4u] : 0u;
+            uint triangle = is_listed ? imageLoad(pool, chunk_place(chunk, i))[i % 4u] : 0u;
             Triangle t = fetch_triangle(triangle);
             if (is_listed && meets(shaft, t)) {
                 bool between = is_whole(surfaces, t);
@@ -326,7 +326,7 @@ void main() {
             }
             i += gl_WorkGroupSize.x;
         } while (i < corners);
-        chunk = texelFetch(pool, chunk_place(chunk, CHUNK), 0).x;
+        chunk = imageLoad(pool, chunk_place(chunk, CHUNK)).x;
         turn += 1u;
         begin += CHUNK;
     } while (begin < candidates.y);
@@ -375,7 +375,7 @@ void main() {
     for (uint i = lane; i < TILE_SIZE * TILE_SIZE && dark; i += gl_WorkGroupSize.x) { // all is lit at the beginning
         // Stores beyond the picture's border are dropped.
         uvec2 pixel = tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);
-        float depth = texelFetch(view_depth, ivec2(min(pixel, size - 1u)), 0).x;
+        float depth = imageLoad(view_depth, ivec2(min(pixel, size - 1u))).x;
         if (is_in_part(depths, depth) && depth > 0.0) {
             imageStore(visibility, ivec2(pixel), vec4(0.0));
         }

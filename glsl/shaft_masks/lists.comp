@@ -18,13 +18,13 @@ layout(set = 0, binding = 0, std140) uniform ViewBlock {
 layout(set = 0, binding = 1, std140) uniform ShaftBlock {
     ShaftParams params;
 };
-layout(set = 0, binding = 2) uniform sampler2D hierarchy;
+layout(set = 0, binding = 2, rgba32f) uniform readonly image2D hierarchy;
 layout(set = 0, binding = 3, std140) uniform Arguments {
     TileArguments arguments;
 };
 layout(set = 0, binding = 4) uniform usampler2D list;
-layout(set = 0, binding = 5) uniform sampler2D shafts;
-layout(set = 0, binding = 6) uniform sampler2D triangles;
+layout(set = 0, binding = 5, rgba32f) uniform readonly image2D shafts;
+layout(set = 0, binding = 6, rgba32f) uniform readonly image2D triangles;
 layout(set = 0, binding = 7, std430) buffer PenumbraArguments {
     TileArguments penumbra;
 };
@@ -41,15 +41,15 @@ layout(set = 0, binding = 12, r32ui) uniform writeonly uimage2D estimates;
 const uint MOST_STEPS = 49152u;
 
 vec4 fetch_triangle_texel(uint texel) {
-    return texelFetch(triangles, triangle_texel_place(texel), 0);
+    return imageLoad(triangles, triangle_texel_place(texel));
 }
 
 vec4 fetch_node_texel(ivec2 place) {
-    return texelFetch(hierarchy, place, 0);
+    return imageLoad(hierarchy, place);
 }
 
 vec4 fetch_shaft_texel(ivec2 place) {
-    return texelFetch(shafts, place, 0);
+    return imageLoad(shafts, place);
 }
 
 // Where a tile's list goes on.

@@ -20,24 +20,24 @@ layout(set = 0, binding = 0, std140) uniform ViewBlock {
 layout(set = 0, binding = 1, std140) uniform ShaftBlock {
     ShaftParams params;
 };
-layout(set = 0, binding = 2) uniform sampler2D view_depth;
-layout(set = 0, binding = 3) uniform usampler2D ids;
-layout(set = 0, binding = 4) uniform sampler2D triangles;
-layout(set = 0, binding = 5) uniform sampler2D hierarchy;
-layout(set = 0, binding = 6) uniform sampler2D materials;
-layout(set = 0, binding = 7) uniform sampler2D uvs;
+layout(set = 0, binding = 2, r32f) uniform readonly image2D view_depth;
+layout(set = 0, binding = 3, r32ui) uniform readonly uimage2D ids;
+layout(set = 0, binding = 4, rgba32f) uniform readonly image2D triangles;
+layout(set = 0, binding = 5, rgba32f) uniform readonly image2D hierarchy;
+layout(set = 0, binding = 6, rgba32f) uniform readonly image2D materials;
+layout(set = 0, binding = 7, rgba32f) uniform readonly image2D uvs;
 layout(set = 0, binding = 8) uniform sampler2D texels;
 layout(set = 0, binding = 9, std140) uniform Arguments {
     TileArguments arguments;
 };
 layout(set = 0, binding = 10) uniform usampler2D list;
-layout(set = 0, binding = 11) uniform sampler2D shafts;
-layout(set = 0, binding = 12) uniform usampler2D edge_pool;
-layout(set = 0, binding = 13) uniform usampler2D lists;
+layout(set = 0, binding = 11, rgba32f) uniform readonly image2D shafts;
+layout(set = 0, binding = 12, r32ui) uniform readonly uimage2D edge_pool;
+layout(set = 0, binding = 13, rgba32ui) uniform readonly uimage2D lists;
 layout(set = 0, binding = 14, r32f) uniform writeonly image2D visibility;
-layout(set = 0, binding = 15) uniform usampler2D tasks;
+layout(set = 0, binding = 15, rgba32ui) uniform readonly uimage2D tasks;
 layout(set = 0, binding = 16, r32ui) uniform uimage2D words;
-layout(set = 0, binding = 17) uniform usampler2D triangle_pool;
+layout(set = 0, binding = 17, r32ui) uniform readonly uimage2D triangle_pool;
 layout(set = 0, binding = 18, r32ui) uniform uimage2D estimates;
 
 layout(push_constant) uniform Push {
@@ -53,23 +53,23 @@ layout(push_constant) uniform Push {
 #include "shaft_masks/masks.glsl"
 
 vec4 fetch_triangle_texel(uint texel) {
-    return texelFetch(triangles, triangle_texel_place(texel), 0);
+    return imageLoad(triangles, triangle_texel_place(texel));
 }
 
 vec4 fetch_node_texel(ivec2 place) {
-    return texelFetch(hierarchy, place, 0);
+    return imageLoad(hierarchy, place);
 }
 
 vec4 fetch_shaft_texel(ivec2 place) {
-    return texelFetch(shafts, place, 0);
+    return imageLoad(shafts, place);
 }
 
 vec4 fetch_material_texel(ivec2 place) {
-    return texelFetch(materials, place, 0);
+    return imageLoad(materials, place);
 }
 
 vec4 fetch_uv_texel(ivec2 place) {
-    return texelFetch(uvs, place, 0);
+    return imageLoad(uvs, place);
 }
 
 vec4 fetch_texture_texel(ivec2 place) {
@@ -79,11 +79,11 @@ vec4 fetch_texture_texel(ivec2 place) {
 // A receiver, and what its own plane hides.
 MaskReceiver fetch_receiver(uvec2 pixel, vec2 depths, out uvec2 blocked) {
     uvec2 within = min(pixel, params.counts.xy - 1u);
-    float depth = texelFetch(view_depth, ivec2(within), 0).x;
+    float depth = imageLoad(view_depth, ivec2(within)).x;
     vec3 ray = pixel_ray(view.camera, within);
     MaskReceiver receiver;
     receiver.in_part = is_in_part(depths, depth);
-    receiver.id = depth > 0.0 ? texelFetch(ids, ivec2(within), 0).x : 0u;
+    receiver.id = depth > 0.0 ? imageLoad(ids, ivec2(within)).x : 0u;
     receiver.position = view.camera.eye.xyz + depth * ray;
     receiver.position += way_into_triangle(receiver.position, receiver.id);
     vec3 normal = fetch_geometric_normal(max(receiver.id, 1u) - 1u);
@@ -148,7 +148,7 @@ uvec2 counted_again(Projection projection, uint first, uint edges) {
         halves[i] = NO_HALVES;
     }
     for (uint i = 0u; i < edges; ++i) {
-        uint code = texelFetch(edge_pool, triangle_texel_place(first + i), 0).x;
+        uint code = imageLoad(edge_pool, triangle_texel_place(first + i)).x;
         count_edge_in_halves(projection, fetch_edge_begin(code), fetch_edge_end(code), code, halves);
     }
     return counted_mask_of_halves(halves);
@@ -161,17 +161,17 @@ void main() {
     }
     index = spread_entry(index, arguments.count);
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
-    uvec4 task = push.further != 0u ? texelFetch(tasks, task_place(index), 0)
+    uvec4 task = push.further != 0u ? imageLoad(tasks, task_place(index))
         : texelFetch(list, tile_entry_place(index, tiles), 0);
     uvec2 part = part_of_entry(task.x, tiles);
     uvec2 tile = tile_of_part(part, tiles);
     vec2 depths = fetch_part_depths(part);
     ivec2 at = list_place(part);
-    uvec4 stored = texelFetch(lists, at, 0);
+    uvec4 stored = imageLoad(lists, at);
     if (stored.w == TILE_SETTLED) {
         return;
     }
-    Entries entries = entries_of(texelFetch(lists, at + ivec2(1, 0), 0), texelFetch(lists, at + ivec2(2, 0), 0));
+    Entries entries = entries_of(imageLoad(lists, at + ivec2(1, 0)), imageLoad(lists, at + ivec2(2, 0)));
     uint block = gl_WorkGroupID.z % params.pattern.y;
     fetch_light_rows(block);
 
@@ -202,7 +202,7 @@ void main() {
         // nothing.
         do {
             if (at_edge < edges) {
-                uint code = texelFetch(edge_pool, triangle_texel_place(entries.first_edge + at_edge), 0).x;
+                uint code = imageLoad(edge_pool, triangle_texel_place(entries.first_edge + at_edge)).x;
                 vec3 a = fetch_edge_begin(code);
                 vec3 b = fetch_edge_end(code);
                 [[unroll]] for (uint i = 0u; i < 4u; ++i) {
@@ -235,7 +235,7 @@ void main() {
         uint at_whole = first;
         do {
             if (at_whole < end) {
-                uint triangle = texelFetch(triangle_pool, triangle_texel_place(entries.first + at_whole), 0).x;
+                uint triangle = imageLoad(triangle_pool, triangle_texel_place(entries.first + at_whole)).x;
                 vec3 a = fetch_triangle_texel(4u * triangle).xyz;
                 vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
                 vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
@@ -254,7 +254,7 @@ void main() {
         do {
             if (at_other < end) {
                 uint place = entries.first + entries.room - 1u - (at_other - entries.whole);
-                Blocker blocker = fetch_blocker(texelFetch(triangle_pool, triangle_texel_place(place), 0).x);
+                Blocker blocker = fetch_blocker(imageLoad(triangle_pool, triangle_texel_place(place)).x);
                 add_blocker(receivers, lights, block, blocker, blocked);
             }
             at_other += 1u;

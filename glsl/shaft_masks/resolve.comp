@@ -16,11 +16,11 @@ layout(set = 0, binding = 1, std140) uniform Arguments {
     TileArguments arguments;
 };
 layout(set = 0, binding = 2) uniform usampler2D list;
-layout(set = 0, binding = 3) uniform usampler2D words;
+layout(set = 0, binding = 3, r32ui) uniform readonly uimage2D words;
 layout(set = 0, binding = 4, r32f) uniform writeonly image2D visibility;
-layout(set = 0, binding = 5) uniform sampler2D view_depth;
-layout(set = 0, binding = 6) uniform sampler2D shafts;
-layout(set = 0, binding = 7) uniform usampler2D lists;
+layout(set = 0, binding = 5, r32f) uniform readonly image2D view_depth;
+layout(set = 0, binding = 6, rgba32f) uniform readonly image2D shafts;
+layout(set = 0, binding = 7, rgba32ui) uniform readonly uimage2D lists;
 layout(set = 0, binding = 8, r32ui) uniform uimage2D estimates;
 
 vec4 fetch_triangle_texel(uint texel) {
@@ -32,7 +32,7 @@ vec4 fetch_node_texel(ivec2 place) {
 }
 
 vec4 fetch_shaft_texel(ivec2 place) {
-    return texelFetch(shafts, place, 0);
+    return imageLoad(shafts, place);
 }
 
 void main() {
@@ -46,16 +46,16 @@ void main() {
     uvec2 tile = tile_of_part(part, tiles);
     uint blocks = params.pattern.y;
     uvec2 pixel = tile * TILE_SIZE + gl_LocalInvocationID.xy;
-    float depth = texelFetch(view_depth, ivec2(min(pixel, params.counts.xy - 1u)), 0).x;
+    float depth = imageLoad(view_depth, ivec2(min(pixel, params.counts.xy - 1u))).x;
     if (!is_in_part(fetch_part_depths(part), depth)) {
         return;
     }
     int hidden = 0;
-    uint slot = texelFetch(lists, list_place(part) + ivec2(2, 0), 0).z;
+    uint slot = imageLoad(lists, list_place(part) + ivec2(2, 0)).z;
     uint changes = 0u;
     for (uint block = 0u; block < blocks; ++block) {
-        uvec2 mask = uvec2(texelFetch(words, word_place(slot, gl_LocalInvocationID.xy, blocks, 2u * block), 0).x,
-            texelFetch(words, word_place(slot, gl_LocalInvocationID.xy, blocks, 2u * block + 1u), 0).x);
+        uvec2 mask = uvec2(imageLoad(words, word_place(slot, gl_LocalInvocationID.xy, blocks, 2u * block)).x,
+            imageLoad(words, word_place(slot, gl_LocalInvocationID.xy, blocks, 2u * block + 1u)).x);
         hidden += bitCount(mask.x) + bitCount(mask.y);
         changes += changes_in(mask, params.rows[0].x == params.rows[1].x);
     }

@@ -31,10 +31,10 @@ void main() {
     uvec2 seen = uvec2(turns ? 0u : ~0u);
     for (uint i = 0u; i < normal_looks; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
-        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        float depth = imageLoad(view_depth, ivec2(pixel)).x;
         vec3 ray = pixel_ray(view.camera, pixel);
         bool counts = depth > 0.0
-            && !is_turned_away(light, eye + depth * ray, fetch_normal(texelFetch(ids, ivec2(pixel), 0).x, ray));
+            && !is_turned_away(light, eye + depth * ray, fetch_normal(imageLoad(ids, ivec2(pixel)).x, ray));
         nearest = counts ? min(nearest, depth) : nearest;
         farthest = counts ? max(farthest, depth) : farthest;
         uint bit = counts ? 1u << (i & 31u) : 0u;
@@ -48,7 +48,7 @@ void main() {
     for (uint i = 0u; i < looks; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE), size - 1u);
         bool counts = ((i < 32u ? seen.x : seen.y) >> (i & 31u) & 1u) != 0u;
-        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
+        float depth = imageLoad(view_depth, ivec2(pixel)).x;
         counts = counts && depth > 0.0;
         depth = counts ? depth : -1.0;
         at_near = depth < middle && depth > before_gap ? pixel : at_near;

@@ -17,15 +17,15 @@ layout(set = 0, binding = 0, std140) uniform ViewBlock {
 layout(set = 0, binding = 1, std140) uniform ShaftBlock {
     ShaftParams params;
 };
-layout(set = 0, binding = 2) uniform sampler2D hierarchy;
+layout(set = 0, binding = 2, rgba32f) uniform readonly image2D hierarchy;
 layout(set = 0, binding = 3, std140) uniform Arguments {
     TileArguments arguments;
 };
 layout(set = 0, binding = 4) uniform usampler2D list;
-layout(set = 0, binding = 5) uniform sampler2D shafts;
-layout(set = 0, binding = 6) uniform sampler2D triangles;
+layout(set = 0, binding = 5, rgba32f) uniform readonly image2D shafts;
+layout(set = 0, binding = 6, rgba32f) uniform readonly image2D triangles;
 layout(set = 0, binding = 7, r32f) uniform writeonly image2D visibility;
-layout(set = 0, binding = 8) uniform sampler2D view_depth;
+layout(set = 0, binding = 8, r32f) uniform readonly image2D view_depth;
 layout(set = 0, binding = 9, r32ui) uniform writeonly uimage2D estimates;
 layout(set = 0, binding = 10, std430) buffer RestArguments {
     TileArguments rest;
@@ -33,15 +33,15 @@ layout(set = 0, binding = 10, std430) buffer RestArguments {
 layout(set = 0, binding = 11, r32ui) uniform writeonly uimage2D rest_list;
 
 vec4 fetch_triangle_texel(uint texel) {
-    return texelFetch(triangles, triangle_texel_place(texel), 0);
+    return imageLoad(triangles, triangle_texel_place(texel));
 }
 
 vec4 fetch_node_texel(ivec2 place) {
-    return texelFetch(hierarchy, place, 0);
+    return imageLoad(hierarchy, place);
 }
 
 vec4 fetch_shaft_texel(ivec2 place) {
-    return texelFetch(shafts, place, 0);
+    return imageLoad(shafts, place);
 }
 
 // Steps of a walk that is short.
@@ -94,7 +94,7 @@ void main() {
     for (uint i = 0u; i < pixels; ++i) {
         // Stores beyond the picture's border are dropped.
         uvec2 pixel = tile_of_part(part, tiles) * TILE_SIZE + uvec2(i % TILE_SIZE, i / TILE_SIZE);
-        float depth = texelFetch(view_depth, ivec2(min(pixel, size - 1u)), 0).x;
+        float depth = imageLoad(view_depth, ivec2(min(pixel, size - 1u))).x;
         if (is_in_part(depths, depth) && depth > 0.0) {
             imageStore(visibility, ivec2(pixel), vec4(0.0));
         }

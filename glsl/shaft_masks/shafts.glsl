@@ -13,9 +13,9 @@ layout(set = 0, binding = 0, std140) uniform ViewBlock {
 layout(set = 0, binding = 1, std140) uniform ShaftBlock {
     ShaftParams params;
 };
-layout(set = 0, binding = 2) uniform sampler2D view_depth;
-layout(set = 0, binding = 3) uniform usampler2D ids;
-layout(set = 0, binding = 4) uniform sampler2D triangles;
+layout(set = 0, binding = 2, r32f) uniform readonly image2D view_depth;
+layout(set = 0, binding = 3, r32ui) uniform readonly uimage2D ids;
+layout(set = 0, binding = 4, rgba32f) uniform readonly image2D triangles;
 layout(set = 0, binding = 5, std140) uniform Arguments {
     TileArguments arguments;
 };
@@ -27,10 +27,10 @@ layout(set = 0, binding = 8, std430) buffer PartArguments {
     TileArguments parts;
 };
 layout(set = 0, binding = 9, r32ui) uniform writeonly uimage2D part_list;
-layout(set = 0, binding = 10) uniform sampler2D tile_bounds;
+layout(set = 0, binding = 10, rgba32f) uniform readonly image2D tile_bounds;
 
 vec4 fetch_triangle_texel(uint texel) {
-    return texelFetch(triangles, triangle_texel_place(texel), 0);
+    return imageLoad(triangles, triangle_texel_place(texel));
 }
 
 // Nothing is fetched from these here.
@@ -79,8 +79,8 @@ vec3 fetch_normal(uint id, vec3 ray) {
 
 // Whether a pixel's point lies within its triangle, or there is nothing.
 bool is_within_triangle(uvec2 pixel) {
-    vec3 p = view.camera.eye.xyz + texelFetch(view_depth, ivec2(pixel), 0).x * pixel_ray(view.camera, pixel);
-    return way_into_triangle(p, texelFetch(ids, ivec2(pixel), 0).x) == vec3(0.0);
+    vec3 p = view.camera.eye.xyz + imageLoad(view_depth, ivec2(pixel)).x * pixel_ray(view.camera, pixel);
+    return way_into_triangle(p, imageLoad(ids, ivec2(pixel)).x) == vec3(0.0);
 }
 
 // Whether all of the light is below a surface's own plane, which then hides all samples: nothing else matters to it.
@@ -94,7 +94,7 @@ bool is_turned_away(Light light, vec3 p, vec3 n) {
 
 // Axes of a box that fits flat surfaces: along the normal of the surface at a pixel, and along the view.
 mat3 surface_frame(uvec2 pixel, vec3 ray) {
-    uint id = texelFetch(ids, ivec2(pixel), 0).x;
+    uint id = imageLoad(ids, ivec2(pixel)).x;
     vec3 z = fetch_geometric_normal(max(id, 1u) - 1u);
     vec3 along = cross(z, ray);
     float square = dot(along, along);
@@ -106,7 +106,7 @@ mat3 surface_frame(uvec2 pixel, vec3 ray) {
 // How far rounding may move a point of a triangle along its ray, metres: view depth is a quotient of two
 // distances from the triangle's plane, small ones where it is seen at a grazing angle.
 float depth_rounding_m(uvec2 pixel, float farthest) {
-    uint id = texelFetch(ids, ivec2(pixel), 0).x;
+    uint id = imageLoad(ids, ivec2(pixel)).x;
     vec3 from_eye = fetch_triangle_texel(4u * (max(id, 1u) - 1u)).xyz - view.camera.eye.xyz;
     vec3 n = fetch_geometric_normal(max(id, 1u) - 1u);
     float far_m = farthest * length(vec2(view.camera.pixel_right.w * length(view.camera.pixel_right.xyz),
@@ -169,8 +169,8 @@ bool corners_tell(uvec2 tile, TileBounds bounds) {
 
 TileBounds fetch_bounds(uvec2 tile) {
     ivec2 place = ivec2(tile.x * TILE_TEXELS, tile.y);
-    return tile_bounds_of(texelFetch(tile_bounds, place, 0), texelFetch(tile_bounds, place + ivec2(1, 0), 0),
-        texelFetch(tile_bounds, place + ivec2(2, 0), 0));
+    return tile_bounds_of(imageLoad(tile_bounds, place), imageLoad(tile_bounds, place + ivec2(1, 0)),
+        imageLoad(tile_bounds, place + ivec2(2, 0)));
 }
 
 // The shaft of a tile's pixels of these view depths. at: one of them, for the frames. across: pixels that are looked at
@@ -178,7 +178,7 @@ TileBounds fetch_bounds(uvec2 tile) {
 void store_shaft(Light light, uvec2 tile, uvec2 tiles, TileBounds bounds, vec2 depths, uvec2 at, bool behind, uint across) {
     uvec2 size = params.counts.xy;
     vec3 eye = view.camera.eye.xyz;
-    vec3 base = eye + texelFetch(view_depth, ivec2(at), 0).x * pixel_ray(view.camera, at);
+    vec3 base = eye + imageLoad(view_depth, ivec2(at)).x * pixel_ray(view.camera, at);
     mat3 frame = light_frame(light, base);
     mat3 box_frame = surface_frame(at, pixel_ray(view.camera, at));
 
@@ -204,8 +204,8 @@ void store_shaft(Light light, uvec2 tile, uvec2 tiles, TileBounds bounds, vec2 d
     uint step = (TILE_SIZE - 1u) / (across - 1u);
     for (uint i = 0u; i < across * across; ++i) {
         uvec2 pixel = min(tile * TILE_SIZE + step * uvec2(i % across, i / across), size - 1u);
-        float depth = texelFetch(view_depth, ivec2(pixel), 0).x;
-        uint id = texelFetch(ids, ivec2(pixel), 0).x;
+        float depth = imageLoad(view_depth, ivec2(pixel)).x;
+        uint id = imageLoad(ids, ivec2(pixel)).x;
         if (depth > 0.0 && is_in_part(depths, depth)) {
             vec3 ray = pixel_ray(view.camera, pixel);
             vec3 p = eye + depth * ray;

@@ -522,7 +522,7 @@ impl SceneBuffers {
             let host = HostImage {
                 image: raw.map_or_else(Default::default, |image| image.raw),
                 desc: self.sizes.images[index],
-                usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+                usage: super::uploads::usage_of(&self.sizes.images[index]),
                 enter: STATIC,
                 leave: STATIC,
             };

@@ -49,7 +49,7 @@ impl Masks {
             lists.lists,
         ];
         for image in images {
-            pass.read(image, Access::Sampled(Stage::Compute));
+            pass.read(image, Access::StorageRead(Stage::Compute));
         }
         tiles.read(&mut pass);
         let bound = pass.write(bound, Access::StorageWrite(Stage::Compute));
@@ -63,15 +63,15 @@ impl Masks {
             let bindings = [
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
-                Bind::sampled(2, gbuffer.view_depth, nearest),
-                Bind::sampled(3, gbuffer.ids, nearest),
-                Bind::sampled(4, ids.triangles, nearest),
+                Bind::storage_image(2, gbuffer.view_depth),
+                Bind::storage_image(3, gbuffer.ids),
+                Bind::storage_image(4, ids.triangles),
                 Bind::uniform(5, tiles.arguments),
                 Bind::sampled(6, tiles.tiles, nearest),
-                Bind::sampled(7, shafts, nearest),
-                Bind::sampled(8, lists.edges, nearest),
-                Bind::sampled(9, lists.triangles, nearest),
-                Bind::sampled(10, lists.lists, nearest),
+                Bind::storage_image(7, shafts),
+                Bind::storage_image(8, lists.edges),
+                Bind::storage_image(9, lists.triangles),
+                Bind::storage_image(10, lists.lists),
                 Bind::storage_image(11, bound),
                 Bind::storage_image(12, estimates),
             ];

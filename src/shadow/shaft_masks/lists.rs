@@ -1,6 +1,9 @@
 //! The passes that find what is between tiles and the light.
 
-use super::{CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, PARTS, POOL_WIDTH, Sizes, masks, part_list, texels};
+use super::{
+    CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, PARTS, POOL_WIDTH, Sizes, masks, part_list,
+    texels,
+};
 use crate::geometry::{TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
@@ -73,7 +76,7 @@ impl Making {
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
         for image in [hierarchy, triangles, shafts, view_depth] {
-            pass.read(image, Access::Sampled(Stage::Compute));
+            pass.read(image, Access::StorageRead(Stage::Compute));
         }
         parts.read(&mut pass);
         rest.fill(&mut pass);
@@ -84,13 +87,13 @@ impl Making {
             let bindings = [
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
-                Bind::sampled(2, hierarchy, nearest),
+                Bind::storage_image(2, hierarchy),
                 Bind::uniform(3, parts.arguments),
                 Bind::sampled(4, parts.tiles, nearest),
-                Bind::sampled(5, shafts, nearest),
-                Bind::sampled(6, triangles, nearest),
+                Bind::storage_image(5, shafts),
+                Bind::storage_image(6, triangles),
                 Bind::storage_image(7, visibility),
-                Bind::sampled(8, view_depth, nearest),
+                Bind::storage_image(8, view_depth),
                 Bind::storage_image(9, estimates),
                 Bind::storage_buffer(10, rest.arguments),
                 Bind::storage_image(11, rest.tiles),
@@ -167,7 +170,7 @@ impl Making {
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
         for image in [hierarchy, triangles, shafts] {
-            pass.read(image, Access::Sampled(Stage::Compute));
+            pass.read(image, Access::StorageRead(Stage::Compute));
         }
         rest.read(&mut pass);
         penumbra.fill(&mut pass);
@@ -180,11 +183,11 @@ impl Making {
             let bindings = [
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
-                Bind::sampled(2, hierarchy, nearest),
+                Bind::storage_image(2, hierarchy),
                 Bind::uniform(3, rest.arguments),
                 Bind::sampled(4, rest.tiles, nearest),
-                Bind::sampled(5, shafts, nearest),
-                Bind::sampled(6, triangles, nearest),
+                Bind::storage_image(5, shafts),
+                Bind::storage_image(6, triangles),
                 Bind::storage_buffer(7, penumbra.arguments),
                 Bind::storage_image(8, penumbra.tiles),
                 Bind::storage_buffer(9, used),
@@ -248,7 +251,7 @@ impl Making {
         pass.read(params, Access::Uniform(Stage::Compute));
         let images = [ids.triangles, ids.neighbours, shafts, view_depth, pool];
         for image in images {
-            pass.read(image, Access::Sampled(Stage::Compute));
+            pass.read(image, Access::StorageRead(Stage::Compute));
         }
         tiles.read(&mut pass);
         partial.fill(&mut pass);
@@ -268,18 +271,18 @@ impl Making {
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
                 Bind::storage_image(2, open.tiles),
-                Bind::sampled(3, ids.triangles, nearest),
-                Bind::sampled(4, ids.neighbours, nearest),
+                Bind::storage_image(3, ids.triangles),
+                Bind::storage_image(4, ids.neighbours),
                 Bind::uniform(5, tiles.arguments),
                 Bind::sampled(6, tiles.tiles, nearest),
-                Bind::sampled(7, shafts, nearest),
-                Bind::sampled(8, pool, nearest),
+                Bind::storage_image(7, shafts),
+                Bind::storage_image(8, pool),
                 Bind::storage_image(9, lists),
                 Bind::storage_buffer(10, used),
                 Bind::storage_image(11, edges),
                 Bind::storage_image(12, triangles),
                 Bind::storage_image(13, visibility),
-                Bind::sampled(14, view_depth, nearest),
+                Bind::storage_image(14, view_depth),
                 Bind::storage_buffer(15, further),
                 Bind::storage_image(16, tasks),
                 Bind::storage_buffer(17, partial.arguments),

@@ -112,9 +112,13 @@ impl Masks {
             triangles,
             lists,
             tasks,
-            list,
+            ids.triangle_uvs,
+            ids.materials,
         ];
-        for image in images.into_iter().chain(ids.mask_images()) {
+        for image in images {
+            pass.read(image, Access::StorageRead(Stage::Compute));
+        }
+        for image in [list, ids.texels] {
             pass.read(image, Access::Sampled(Stage::Compute));
         }
         pass.read(arguments, Access::Indirect);
@@ -147,22 +151,22 @@ impl Masks {
             let bindings = [
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
-                Bind::sampled(2, gbuffer.view_depth, nearest),
-                Bind::sampled(3, gbuffer.ids, nearest),
-                Bind::sampled(4, ids.triangles, nearest),
-                Bind::sampled(5, ids.hierarchy, nearest),
-                Bind::sampled(6, ids.materials, nearest),
-                Bind::sampled(7, ids.triangle_uvs, nearest),
+                Bind::storage_image(2, gbuffer.view_depth),
+                Bind::storage_image(3, gbuffer.ids),
+                Bind::storage_image(4, ids.triangles),
+                Bind::storage_image(5, ids.hierarchy),
+                Bind::storage_image(6, ids.materials),
+                Bind::storage_image(7, ids.triangle_uvs),
                 Bind::sampled(8, ids.texels, nearest),
                 Bind::uniform(9, arguments),
                 Bind::sampled(10, list, nearest),
-                Bind::sampled(11, shafts, nearest),
-                Bind::sampled(12, edges, nearest),
-                Bind::sampled(13, lists, nearest),
+                Bind::storage_image(11, shafts),
+                Bind::storage_image(12, edges),
+                Bind::storage_image(13, lists),
                 Bind::storage_image(14, visibility),
-                Bind::sampled(15, tasks, nearest),
+                Bind::storage_image(15, tasks),
                 Bind::storage_image(16, words),
-                Bind::sampled(17, triangles, nearest),
+                Bind::storage_image(17, triangles),
                 Bind::storage_image(18, estimates),
             ];
             let pipeline = ComputePipelineDesc {
@@ -194,7 +198,7 @@ impl Masks {
         pass.read(params, Access::Uniform(Stage::Compute));
         pieces.read(&mut pass);
         for image in [words, view_depth, shafts, lists] {
-            pass.read(image, Access::Sampled(Stage::Compute));
+            pass.read(image, Access::StorageRead(Stage::Compute));
         }
         let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
         let estimates = pass.write(made.estimates, Access::StorageReadWrite(Stage::Compute));
@@ -205,11 +209,11 @@ impl Masks {
                 Bind::uniform(0, params),
                 Bind::uniform(1, pieces.arguments),
                 Bind::sampled(2, pieces.tiles, nearest),
-                Bind::sampled(3, words, nearest),
+                Bind::storage_image(3, words),
                 Bind::storage_image(4, visibility),
-                Bind::sampled(5, view_depth, nearest),
-                Bind::sampled(6, shafts, nearest),
-                Bind::sampled(7, lists, nearest),
+                Bind::storage_image(5, view_depth),
+                Bind::storage_image(6, shafts),
+                Bind::storage_image(7, lists),
                 Bind::storage_image(8, estimates),
             ];
             ctx.bind_compute(&pipeline, &bindings, &[])?;

@@ -307,7 +307,7 @@ pub(super) fn add_shafts(
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
         for image in images {
-            pass.read(image, Access::Sampled(Stage::Compute));
+            pass.read(image, Access::StorageRead(Stage::Compute));
         }
         listed.read(&mut pass);
         if is_rough {
@@ -324,15 +324,15 @@ pub(super) fn add_shafts(
             let mut bindings = vec![
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
-                Bind::sampled(2, gbuffer.view_depth, nearest),
-                Bind::sampled(3, gbuffer.ids, nearest),
-                Bind::sampled(4, triangles, nearest),
+                Bind::storage_image(2, gbuffer.view_depth),
+                Bind::storage_image(3, gbuffer.ids),
+                Bind::storage_image(4, triangles),
                 Bind::uniform(5, listed.arguments),
                 Bind::sampled(6, listed.tiles, nearest),
                 Bind::storage_image(7, shafts),
                 Bind::storage_buffer(8, parts.arguments),
                 Bind::storage_image(9, parts.tiles),
-                Bind::sampled(10, tile_bounds, nearest),
+                Bind::storage_image(10, tile_bounds),
             ];
             let shader = match is_rough {
                 false => &spirv::SHAFT_MASKS_SHAFTS_COMP,

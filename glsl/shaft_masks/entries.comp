@@ -66,6 +66,14 @@ layout(set = 0, binding = 22, std430) buffer OpenArguments {
     TileArguments open_tiles;
 };
 layout(set = 0, binding = 2, r32ui) uniform writeonly uimage2D open_list;
+// The same, plain ones from the begin of a list of their own and others from its end.
+layout(set = 0, binding = 23, std430) buffer PlainArguments {
+    TileArguments plain;
+};
+layout(set = 0, binding = 24, std430) buffer OtherArguments {
+    TileArguments others_than_plain;
+};
+layout(set = 0, binding = 25, r32ui) uniform writeonly uimage2D sorted_list;
 
 #define SUN_TANGENT_SQUARE (view.light.axis_x.w * view.light.axis_x.w)
 
@@ -160,8 +168,9 @@ bool sees_through(vec3 p, Light light, mat3 frame, vec3 half_size, Triangle t, f
     vec3 ca = cross(c, a);
     vec3 edges = turn * vec3(dot(ab, to), dot(bc, to), dot(ca, to));
     edges -= vec3(dot(abs(ab * frame), half_size), dot(abs(bc * frame), half_size), dot(abs(ca * frame), half_size));
-    vec3 lengths = vec3(length(a), length(b), length(c));
-    vec3 margins = margin_m * (length(to) + length(half_size)) * (lengths + lengths.yzx);
+    // Sums of coordinates, which lengths are at most.
+    vec3 lengths = vec3(dot(abs(a), vec3(1.0)), dot(abs(b), vec3(1.0)), dot(abs(c), vec3(1.0)));
+    vec3 margins = margin_m * (dot(abs(to), vec3(1.0)) + dot(half_size, vec3(1.0))) * (lengths + lengths.yzx);
     return between && all(greaterThan(edges, margins));
 }
 
@@ -183,10 +192,16 @@ bool rows_have_one_axis(Light light, Surfaces surfaces) {
     return abs(along - NEAR_AXIS) > surfaces.tilt + 1.0e-5;
 }
 
+// What an invocation knows of the edges that it staged: kept to itself until all are, because what is shared is dear.
+struct Staged {
+    uint count_sum;
+    bool meets; // any meets the shaft
+};
+
 // Stages an edge: one that is beyond the samples on the side that edges count towards, or beyond the ends of
 // all rows, seen from every surface, is left out.
 // one_axis: rows lie along the same axis of a sphere for all surfaces.
-void stage_edge(Shaft shaft, bool one_axis, vec3 a, vec3 b, uint code) {
+void stage_edge(inout Staged known, Shaft shaft, bool one_axis, vec3 a, vec3 b, uint code) {
     bool beyond = false;
     bool outside = false;
     // The rows of a sphere's disk turn a little from pixel to pixel, and by a right angle where they lie along another
@@ -200,10 +215,8 @@ void stage_edge(Shaft shaft, bool one_axis, vec3 a, vec3 b, uint code) {
     }
     if (!beyond) {
         uint at = atomicAdd(edge_count, 1u);
-        atomicAdd(count_sum, (code & EDGE_DOUBLE) != 0u ? 2u : 1u);
-        if (!outside) {
-            meeting_edges = 1u;
-        }
+        known.count_sum += (code & EDGE_DOUBLE) != 0u ? 2u : 1u;
+        known.meets = known.meets || !outside;
         if (at < MOST_EDGES) {
             staged[at] = code;
         }
@@ -211,7 +224,7 @@ void stage_edge(Shaft shaft, bool one_axis, vec3 a, vec3 b, uint code) {
 }
 
 // The edge of a counted triangle that begins at a corner.
-void add_edge(Shaft shaft, Surfaces surfaces, uint triangle, uint corner, uint side) {
+void add_edge(inout Staged known, Shaft shaft, Surfaces surfaces, uint triangle, uint corner, uint side) {
     uint beside = imageLoad(neighbours, triangle_texel_place(triangle))[corner];
     vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
     vec3 b = fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
@@ -226,7 +239,8 @@ void add_edge(Shaft shaft, Surfaces surfaces, uint triangle, uint corner, uint s
     bool fold = both && !goes_on;
     if (!goes_on && !(fold && other < triangle)) {
         uint code = triangle << EDGE_CORNER_BITS | corner | (fold ? EDGE_DOUBLE : 0u);
-        stage_edge(shaft, rows_have_one_axis(view.light, surfaces), a, b, code | (side == SIDE_BACK ? EDGE_TURNED : 0u));
+        code |= side == SIDE_BACK ? EDGE_TURNED : 0u;
+        stage_edge(known, shaft, rows_have_one_axis(view.light, surfaces), a, b, code);
     }
 }
 
@@ -279,6 +293,7 @@ void main() {
     uint chunk = candidates.x;
     uint turn = 0u;
     uint begin = 0u;
+    Staged known = Staged(0u, false);
     // Loops look at their end whether they go on: a driver without branches does one more turn of others, for nothing.
     do {
         uint end = min(CHUNK, candidates.y - begin);
@@ -322,7 +337,7 @@ void main() {
         do {
             uint code = counted[turn % 2u][min(i / 3u, CHUNK - 1u)];
             if (i < corners) {
-                add_edge(shaft, surfaces, code >> 1, i % 3u, (code & 1u) != 0u ? SIDE_BACK : SIDE_FRONT);
+                add_edge(known, shaft, surfaces, code >> 1, i % 3u, (code & 1u) != 0u ? SIDE_BACK : SIDE_FRONT);
             }
             i += gl_WorkGroupSize.x;
         } while (i < corners);
@@ -330,6 +345,10 @@ void main() {
         turn += 1u;
         begin += CHUNK;
     } while (begin < candidates.y);
+    atomicAdd(count_sum, known.count_sum);
+    if (known.meets) {
+        meeting_edges = 1u;
+    }
     barrier();
 
     // A list that ends early is not used: an edge between a triangle in the list and one that found no room in it
@@ -401,6 +420,19 @@ void main() {
             atomicMax(open_tiles.groups_x, min(slot + 1u, TILE_ROW));
             atomicMax(open_tiles.groups_y, slot / TILE_ROW + 1u);
             imageStore(open_list, tile_entry_place(slot, tiles), uvec4(entry));
+        }
+        bool is_plain = fits && others == 0u && whole <= TASK_ENTRIES && count_sum <= MOST_PLAIN && shaft.low.w > 0.0;
+        if (!settled && is_plain) {
+            uint slot = atomicAdd(plain.count, 1u);
+            atomicMax(plain.groups_x, min(slot + 1u, TILE_ROW));
+            atomicMax(plain.groups_y, slot / TILE_ROW + 1u);
+            imageStore(sorted_list, tile_entry_place(slot, tiles), uvec4(entry));
+        }
+        if (!settled && !is_plain) {
+            uint slot = atomicAdd(others_than_plain.count, 1u);
+            atomicMax(others_than_plain.groups_x, min(slot + 1u, TILE_ROW));
+            atomicMax(others_than_plain.groups_y, slot / TILE_ROW + 1u);
+            imageStore(sorted_list, place_from_end(slot, tiles), uvec4(entry));
         }
         if (!settled && (params.pattern.y > 1u || whole + others > TASK_ENTRIES || partly)) {
             uint slot = atomicAdd(pieces.count, 1u);

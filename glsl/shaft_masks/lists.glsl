@@ -44,6 +44,12 @@ ivec2 list_place(uvec2 part) {
     return ivec2(part.x * LIST_TEXELS, part.y);
 }
 
+// Tiles of an image that holds two lists of them, one from its begin on and one from its end.
+ivec2 place_from_end(uint index, uvec2 tiles) {
+    uint last = 2u * tiles.x * tiles.y - 1u;
+    return ivec2((last - index) % tiles.x, (last - index) / tiles.x);
+}
+
 ivec2 task_place(uint task) {
     return triangle_texel_place(task);
 }

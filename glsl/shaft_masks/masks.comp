@@ -13,6 +13,8 @@ layout(local_size_x = 8, local_size_y = 2) in;
 
 // 1 for what lists do not know: a pipeline of its own, because it has code of its own.
 layout(constant_id = 1) const uint WALK = 0u;
+// 1 where tiles are listed from the end of their image on.
+layout(constant_id = 5) const uint FROM_END = 0u;
 
 layout(set = 0, binding = 0, std140) uniform ViewBlock {
     ViewParams view;
@@ -39,6 +41,15 @@ layout(set = 0, binding = 15, rgba32ui) uniform readonly uimage2D tasks;
 layout(set = 0, binding = 16, r32ui) uniform uimage2D words;
 layout(set = 0, binding = 17, r32ui) uniform readonly uimage2D triangle_pool;
 layout(set = 0, binding = 18, r32ui) uniform uimage2D estimates;
+
+// Receivers whose numbers of triangles have no room in digits: of an invocation each its task.
+layout(set = 0, binding = 19, std430) buffer SpilledArguments {
+    TileArguments spilled;
+};
+layout(set = 0, binding = 20, r32ui) uniform uimage2D spilled_tasks;
+// 1 where these are worked on, an invocation each.
+layout(constant_id = 6) const uint SPILLED = 0u;
+const uint INVOCATIONS = 16u;
 
 layout(push_constant) uniform Push {
     uint first_run; // of nodes, of this dispatch
@@ -86,9 +97,12 @@ MaskReceiver fetch_receiver(uvec2 pixel, vec2 depths, out uvec2 blocked) {
     receiver.id = depth > 0.0 ? imageLoad(ids, ivec2(within)).x : 0u;
     receiver.position = view.camera.eye.xyz + depth * ray;
     receiver.position += way_into_triangle(receiver.position, receiver.id);
-    vec3 normal = fetch_geometric_normal(max(receiver.id, 1u) - 1u);
-    normal = dot(normal, ray) > 0.0 ? -normal : normal;
-    blocked = own_mask(rows_from(view.light, receiver.position), normal);
+    blocked = uvec2(0u);
+    if (PLAIN == 0u) {
+        vec3 normal = fetch_geometric_normal(max(receiver.id, 1u) - 1u);
+        normal = dot(normal, ray) > 0.0 ? -normal : normal;
+        blocked = own_mask(rows_from(view.light, receiver.position), normal);
+    }
     return receiver;
 }
 
@@ -154,16 +168,35 @@ uvec2 counted_again(Projection projection, uint first, uint edges) {
     return counted_mask_of_halves(halves);
 }
 
+void list_spilled(uint entry, uint block) {
+    uint at = atomicAdd(spilled.count, 1u);
+    uint group = at / INVOCATIONS;
+    atomicMax(spilled.groups_x, min(group + 1u, TILE_ROW));
+    atomicMax(spilled.groups_y, group / TILE_ROW + 1u);
+    uint task = (entry * MOST_BLOCKS + block) * INVOCATIONS + gl_LocalInvocationIndex;
+    imageStore(spilled_tasks, task_place(at), uvec4(task));
+}
+
 void main() {
     uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
-    if (index >= arguments.count) {
-        return;
+    uint own_task = 0u;
+    if (SPILLED != 0u) {
+        index = index * INVOCATIONS + gl_LocalInvocationIndex;
+        if (index >= arguments.count) {
+            return;
+        }
+        own_task = imageLoad(spilled_tasks, task_place(index)).x;
+    } else {
+        if (index >= arguments.count) {
+            return;
+        }
+        index = spread_entry(index, arguments.count);
     }
-    index = spread_entry(index, arguments.count);
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;
     uvec4 task = push.further != 0u ? imageLoad(tasks, task_place(index))
-        : texelFetch(list, tile_entry_place(index, tiles), 0);
-    uvec2 part = part_of_entry(task.x, tiles);
+        : texelFetch(list, FROM_END != 0u ? place_from_end(index, tiles) : tile_entry_place(index, tiles), 0);
+    uint entry = SPILLED != 0u ? own_task / (MOST_BLOCKS * INVOCATIONS) : task.x;
+    uvec2 part = part_of_entry(entry, tiles);
     uvec2 tile = tile_of_part(part, tiles);
     vec2 depths = fetch_part_depths(part);
     ivec2 at = list_place(part);
@@ -172,19 +205,21 @@ void main() {
         return;
     }
     Entries entries = entries_of(imageLoad(lists, at + ivec2(1, 0)), imageLoad(lists, at + ivec2(2, 0)));
-    uint block = gl_WorkGroupID.z % params.pattern.y;
+    uint block = SPILLED != 0u ? own_task / INVOCATIONS % MOST_BLOCKS : gl_WorkGroupID.z % params.pattern.y;
+    uint invocation = SPILLED != 0u ? own_task % INVOCATIONS : gl_LocalInvocationIndex;
     fetch_light_rows(block);
 
     uvec2 pixels[4];
     MaskReceiver receivers[4];
     uvec2 blocked[4];
     [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-        pixels[i] = tile * TILE_SIZE + gl_LocalInvocationID.xy + uvec2(0u, 2u * i);
+        pixels[i] = tile * TILE_SIZE + uvec2(invocation % TILE_SIZE, invocation / TILE_SIZE + 2u * i);
         receivers[i] = fetch_receiver(pixels[i], depths, blocked[i]);
     }
     bool in_parts = params.pattern.y > 1u || entries.whole + entries.others > TASK_ENTRIES
         || stored.z < params.counts.z;
 
+    bool is_spilled = false;
     if (WALK == 0u) {
         Projection from[4];
         uint digits[4][ROWS];
@@ -201,7 +236,7 @@ void main() {
         // Loops look at their end whether they go on: a driver without branches does one more turn of others, for
         // nothing.
         do {
-            if (at_edge < edges) {
+            if (at_edge < edges && SPILLED == 0u) {
                 uint code = imageLoad(edge_pool, triangle_texel_place(entries.first_edge + at_edge)).x;
                 vec3 a = fetch_edge_begin(code);
                 vec3 b = fetch_edge_end(code);
@@ -211,23 +246,21 @@ void main() {
             }
             at_edge += 1u;
         } while (at_edge < edges);
-        bool spilled[4];
-        [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+        [[unroll]] for (uint i = 0u; i < 4u && SPILLED == 0u; ++i) {
             bool fits;
             blocked[i] |= counted_mask(digits[i], sums[i], fits);
-            spilled[i] = !fits;
+            is_spilled = is_spilled || !fits;
         }
-        // Rare: one receiver after the other.
-        uint first_spilled = spilled[0] ? 0u : spilled[1] ? 1u : spilled[2] ? 2u : spilled[3] ? 3u : 4u;
-        for (uint at_spilled = first_spilled; at_spilled < 4u; ++at_spilled) {
+        // One receiver after the other.
+        for (uint at = 0u; at < 4u && SPILLED != 0u; ++at) {
             vec3 position = receivers[0].position;
             [[unroll]] for (uint i = 1u; i < 4u; ++i) {
-                position = i == at_spilled ? receivers[i].position : position;
+                position = i == at ? receivers[i].position : position;
             }
             Projection again = projection_from(MaskReceiver(position, 0u, true), row_rise());
             uvec2 mask = counted_again(again, entries.first_edge, edges);
             [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-                blocked[i] |= i == at_spilled && spilled[i] ? mask : uvec2(0u);
+                blocked[i] |= i == at ? mask : uvec2(0u);
             }
         }
         uint first = push.further != 0u ? task.y : 0u;
@@ -245,20 +278,22 @@ void main() {
             }
             at_whole += 1u;
         } while (at_whole < end);
-        end = min(first + TASK_ENTRIES, entries.whole + entries.others);
-        LightFrom lights[4];
-        [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-            lights[i] = rows_from(view.light, receivers[i].position);
-        }
-        uint at_other = max(first, entries.whole);
-        do {
-            if (at_other < end) {
-                uint place = entries.first + entries.room - 1u - (at_other - entries.whole);
-                Blocker blocker = fetch_blocker(imageLoad(triangle_pool, triangle_texel_place(place)).x);
-                add_blocker(receivers, lights, block, blocker, blocked);
+        if (PLAIN == 0u) {
+            end = min(first + TASK_ENTRIES, entries.whole + entries.others);
+            LightFrom lights[4];
+            [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+                lights[i] = rows_from(view.light, receivers[i].position);
             }
-            at_other += 1u;
-        } while (at_other < end);
+            uint at_other = max(first, entries.whole);
+            do {
+                if (at_other < end) {
+                    uint place = entries.first + entries.room - 1u - (at_other - entries.whole);
+                    Blocker blocker = fetch_blocker(imageLoad(triangle_pool, triangle_texel_place(place)).x);
+                    add_blocker(receivers, lights, block, blocker, blocked);
+                }
+                at_other += 1u;
+            } while (at_other < end);
+        }
     } else {
         LightFrom lights[4];
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {
@@ -279,6 +314,10 @@ void main() {
                 add_blocker(receivers, lights, block, blocker, blocked);
             }
         }
+    }
+    if (WALK == 0u && PLAIN == 0u && SPILLED == 0u && is_spilled) {
+        list_spilled(entry, block);
+        return;
     }
     uint changes = 0u;
     [[unroll]] for (uint i = 0u; i < 4u; ++i) {

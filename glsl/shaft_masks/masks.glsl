@@ -16,6 +16,9 @@
 
 // 1 where triangles of the scene may have holes.
 layout(constant_id = 3) const uint MASKED = 0u;
+// 1 for tiles of few edges, MOST_PLAIN in sum, and no triangles but whole ones, whose surfaces have all of the light above
+// them: a pipeline of its own, because one without branches goes through what it does for others.
+layout(constant_id = 2) const uint PLAIN = 0u;
 
 // The light as a receiver sees it: its samples are center + u x + v y, from the receiver.
 struct LightFrom {
@@ -89,6 +92,7 @@ void fetch_light_rows(uint block) {
 
 // Adding 1.5 * 2^23 leaves a float's integer part in its lowest bits.
 const float TO_INTEGER = 12582912.0;
+const int TO_INTEGER_BITS = 0x4b400000;
 
 // Four times the number of a row's samples that lie before the place, 0 to 32: rounded from above 4 n - 2, so that
 // the sample at a whole column plus 0.5 is the next one's neighbour.
@@ -98,8 +102,9 @@ uint quads_before(uint r, float place) {
     if (LIGHT_SHAPE == LIGHT_SUN) {
         quad = row.x * (place * inversesqrt(light_rows[r].w + place * place * SUN_TANGENT_SQUARE)) + row.y;
     }
-    precise float shifted = clamp(quad, 0.0, 33.5) + TO_INTEGER;
-    return floatBitsToUint(shifted) & 60u;
+    // Floats of one sign are in the order of their bits.
+    precise float shifted = quad + TO_INTEGER;
+    return uint(clamp(floatBitsToInt(shifted), TO_INTEGER_BITS, TO_INTEGER_BITS + 33)) & 60u;
 }
 
 // Number of a row's samples that lie before the place, 0 to 8.
@@ -168,8 +173,10 @@ bool crosses(vec4 row, Side side) {
 
 // Numbers of triangles before samples: a word of eight digits for each row. Below nothing there is some room for
 // rounding, and above it for 13 triangles. Sums of edges may leave that range on their way; where their end does,
-// digits spill into each other. Then their sum is not that of the numbers, which is kept beside them.
-const uint NO_DIGITS = 0x22222222u;
+// digits spill into each other. Then their sum is not that of the numbers, which is kept beside them. Those of plain
+// tiles cannot spill: there is room for all edges on either side of nothing.
+const uint MOST_PLAIN = 7u;
+const uint NO_DIGITS = PLAIN != 0u ? 0x77777777u : 0x22222222u;
 const uint ONE_DIGIT = 0x11111111u;
 
 struct Edge {
@@ -196,7 +203,7 @@ void count_edge(Projection projection, vec3 from, vec3 to, uint code, inout uint
     for (uint r = 0u; r < ROWS; ++r) {
         uint before = crosses(light_rows[r], edge.side) ? quads_before_side(r, edge.side) : 32u;
         digits[r] += before < 32u ? step << before : 0u;
-        quads += before;
+        quads += PLAIN != 0u ? 0u : before;
     }
     sum += weight * int(32u * ROWS - quads);
 }
@@ -215,7 +222,7 @@ uvec2 counted_mask(uint digits[ROWS], int sum, out bool fits) {
         off = (off | off >> 6) & 0x000f000fu;
         blocked[r / 4u] |= ((off | off >> 12) & 0xffu) << (8u * (r % 4u));
     }
-    fits = 4 * (int(total) - int(2u * COLUMNS * ROWS)) == sum;
+    fits = PLAIN != 0u || 4 * (int(total) - int(2u * COLUMNS * ROWS)) == sum;
     return fits ? blocked : uvec2(0u);
 }
 
@@ -299,22 +306,66 @@ uvec2 line_mask_from(float place) {
     return uvec2(bit < 32 ? low : 0u, bit < 32 ? ~0u : bit < 64 ? low : 0u);
 }
 
-// The samples within the line.
-uvec2 mask_of_line(vec3 line) {
+// Where a line on the light crosses the row at y: at slope y + at. The samples before that are within where before is
+// set, else the others.
+struct Crossing {
+    float slope;
+    float at;
+    bool before;
+};
+
+Crossing crossing_of_line(vec3 line) {
     // A line along the rows crosses them far out: there only its side counts.
     float least = 1.0e-8 * (abs(line.y) + abs(line.z)) + 1.0e-37;
     float across = abs(line.x) < least ? (line.x < 0.0 ? -least : least) : line.x;
     float inverse = -1.0 / across;
-    float slope = line.y * inverse;
-    float at = line.z * inverse;
+    return Crossing(line.y * inverse, line.z * inverse, across < 0.0);
+}
+
+// The samples within the line.
+uvec2 mask_of_line(vec3 line) {
+    Crossing crossing = crossing_of_line(line);
     if (LIGHT_SHAPE == LIGHT_LINE) {
-        return line_mask_from(at) ^ (across < 0.0 ? ~0u : 0u);
+        return line_mask_from(crossing.at) ^ (crossing.before ? ~0u : 0u);
     }
-    uint flip = across < 0.0 ? 0xffu : 0u;
+    uint flip = crossing.before ? 0xffu : 0u;
     uvec2 within = uvec2(0u);
     for (uint r = 0u; r < ROWS; ++r) {
-        precise float place = slope * light_rows[r].x + at;
+        precise float place = crossing.slope * light_rows[r].x + crossing.at;
         uint row = (0xffu << columns_before(r, place) ^ flip) & 0xffu;
+        within[r / 4u] |= row << (8u * (r % 4u));
+    }
+    return within;
+}
+
+// The samples within all of the lines; the last one counts if so said. Of each row those between the last crossing that
+// they are behind and the first one that they are before: two places are made to columns, and not one for each line.
+const uint LINES = 4u;
+const float FAR_ALONG = 1.0e6;
+
+uvec2 mask_of_lines(vec3 lines[LINES], bool last_counts) {
+    if (LIGHT_SHAPE == LIGHT_LINE) {
+        uvec2 within = mask_of_line(lines[0]) & mask_of_line(lines[1]) & mask_of_line(lines[2]);
+        return within & (last_counts ? mask_of_line(lines[3]) : uvec2(0xffffffffu));
+    }
+    Crossing crossings[LINES];
+    for (uint i = 0u; i < LINES; ++i) {
+        crossings[i] = crossing_of_line(lines[i]);
+    }
+    bool from[LINES] = bool[](!crossings[0].before, !crossings[1].before, !crossings[2].before, !crossings[3].before && last_counts);
+    bool to[LINES] = bool[](crossings[0].before, crossings[1].before, crossings[2].before, crossings[3].before && last_counts);
+    uvec2 within = uvec2(0u);
+    for (uint r = 0u; r < ROWS; ++r) {
+        float first = -FAR_ALONG;
+        float end = FAR_ALONG;
+        for (uint i = 0u; i < LINES; ++i) {
+            precise float place = crossings[i].slope * light_rows[r].x + crossings[i].at;
+            float low = from[i] ? place : -FAR_ALONG;
+            float high = to[i] ? place : FAR_ALONG;
+            first = low > first ? low : first;
+            end = high < end ? high : end;
+        }
+        uint row = 0xffu << columns_before(r, first) & ~(0xffu << columns_before(r, end)) & 0xffu;
         within[r / 4u] |= row << (8u * (r % 4u));
     }
     return within;
@@ -364,8 +415,7 @@ Hidden hidden_by(MaskReceiver receiver, LightFrom light, Blocker blocker) {
     beyond.z -= LIGHT_SHAPE == LIGHT_SUN ? 0.0 : abs(height) + 4.0 * rounding_m;
     float most = min(min(line_most(ab), line_most(bc)), min(line_most(ca), line_most(beyond)));
     bool meets = most >= 0.0 && abs(height) > rounding_m && receiver.id != blocker.triangle + 1u;
-    uvec2 within = mask_of_line(ab) & mask_of_line(bc) & mask_of_line(ca);
-    within &= line_least(beyond) < 0.0 ? mask_of_line(beyond) : uvec2(0xffffffffu);
+    uvec2 within = mask_of_lines(vec3[](ab, bc, ca, beyond), line_least(beyond) < 0.0);
     return Hidden(meets ? within : uvec2(0u), mat3(bc, ca, ab));
 }
 

@@ -10,6 +10,7 @@ layout(constant_id = 0) const uint LIGHT_SHAPE = 0u;
 const float ROW_COSINE = 0.92387953251;
 const float ROW_SINE = 0.38268343236;
 const uint MOST_ROWS = 32u;
+const uint MOST_BLOCKS = 16u; // of 8 rows of 8
 
 struct ShaftParams {
     uvec4 counts;  // width and height of the picture in pixels, nodes, chunks of the pool of candidates

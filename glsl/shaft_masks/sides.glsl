@@ -39,11 +39,16 @@ Surfaces fetch_surfaces(uvec2 part, Light light) {
         across.xyz, across.w, ends.x, ends.y, ends.w);
 }
 
+// How far z turns a length, at most: only that of a sphere does at all, and roots are dear.
+float most_turn(Surfaces surfaces, vec3 way, float more_m) {
+    return LIGHT_SHAPE == LIGHT_SPHERE ? surfaces.tilt * (length(way) + more_m) : 0.0;
+}
+
 // Whether all points within radius_m of a are between.
 bool is_between(Surfaces surfaces, vec3 a, float radius_m) {
     float height = dot(a - surfaces.origin, surfaces.z);
-    float turn_light = surfaces.tilt * (length(a - surfaces.origin) + radius_m) + radius_m;
-    float turn = surfaces.tilt * (length(a - surfaces.center) + radius_m + surfaces.radius_m) + radius_m;
+    float turn_light = most_turn(surfaces, a - surfaces.origin, radius_m) + radius_m;
+    float turn = most_turn(surfaces, a - surfaces.center, radius_m + surfaces.radius_m) + radius_m;
     return height - turn_light > surfaces.low && height + turn < surfaces.high;
 }
 
@@ -62,7 +67,7 @@ bool is_beyond_light(Surfaces surfaces, vec3 a, vec3 b, vec3 c) {
     vec3 from_b = b - surfaces.origin;
     vec3 from_c = c - surfaces.origin;
     vec3 heights = vec3(dot(from_a, surfaces.z), dot(from_b, surfaces.z), dot(from_c, surfaces.z))
-        + surfaces.tilt * vec3(length(from_a), length(from_b), length(from_c));
+        + vec3(most_turn(surfaces, from_a, 0.0), most_turn(surfaces, from_b, 0.0), most_turn(surfaces, from_c, 0.0));
     return max(heights.x, max(heights.y, heights.z)) < surfaces.end;
 }
 

@@ -32,6 +32,14 @@ Step step_at(Shaft shaft, Surfaces surfaces, uint node) {
     return Step(leaf || enter ? node + 1u : uint(-low.w), uint(max(low.w, 0.0)), leaf && enter, out_of_it);
 }
 
+// The same without a look at whether edges cancel: what lies within the shaft is gone into.
+Step short_step_at(Shaft shaft, uint node) {
+    vec4 low = fetch_node_low(node);
+    bool leaf = low.w >= 0.0;
+    bool enter = shaft_meets_box(shaft, low.xyz, fetch_node_high(node).xyz);
+    return Step(leaf || enter ? node + 1u : uint(-low.w), uint(max(low.w, 0.0)), leaf && enter, false);
+}
+
 // Longest list whose triangles are looked at one by one. Invocations of a vector wait for the one with most of them.
 const uint SHORT_LIST = 8u;
 

@@ -32,6 +32,8 @@ struct Candidates {
     pieces: TileList,
     /// Tiles that masks are made of.
     open: TileList,
+    /// `sorted` of [`Lists`].
+    sorted: [TileList; 2],
 }
 
 impl Making {
@@ -126,6 +128,8 @@ impl Making {
         let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
         let mut penumbra = part_list(graph, inputs, "penumbra");
         let mut open = part_list(graph, inputs, "open");
+        let mut plain = part_list(graph, inputs, "plain");
+        let mut sorted = part_list(graph, inputs, "sorted");
         let mut partial = part_list(graph, inputs, "partial");
         let mut pieces = part_list(graph, inputs, "pieces");
         let sixteen = BufferDesc { size: 16 };
@@ -134,6 +138,8 @@ impl Making {
         let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
         penumbra.clear(&mut pass);
         open.clear(&mut pass);
+        plain.clear(&mut pass);
+        sorted.clear(&mut pass);
         partial.clear(&mut pass);
         pieces.clear(&mut pass);
         let used = pass.overwrite(used, Access::Clear);
@@ -145,6 +151,8 @@ impl Making {
         let arguments = [
             (penumbra.arguments, [0, 1, 1, 0]),
             (open.arguments, none),
+            (plain.arguments, none),
+            (sorted.arguments, none),
             (further, none),
             (partial.arguments, no_partial),
             (pieces.arguments, [0, 1, 1, 0]),
@@ -212,6 +220,7 @@ impl Making {
             partial,
             pieces,
             open,
+            sorted: [plain, sorted],
         };
         (candidates, Made { estimates, ..made })
     }
@@ -234,6 +243,7 @@ impl Making {
             mut partial,
             mut pieces,
             mut open,
+            sorted: [plain, mut others],
         } = candidates;
         let edges = texels(vk::Format::R32_UINT, sizes.edge_rows * POOL_WIDTH);
         let edges = graph.create_image(format!("{NAME}.edges {name}"), edges);
@@ -257,6 +267,11 @@ impl Making {
         partial.fill(&mut pass);
         pieces.fill(&mut pass);
         open.fill(&mut pass);
+        others.fill(&mut pass);
+        let plain = TileList {
+            arguments: pass.write(plain.arguments, Access::StorageReadWrite(Stage::Compute)),
+            tiles: others.tiles,
+        };
         let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
         let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
         let further = pass.write(further, Access::StorageReadWrite(Stage::Compute));
@@ -291,6 +306,9 @@ impl Making {
                 Bind::storage_image(20, pieces.tiles),
                 Bind::storage_image(21, estimates),
                 Bind::storage_buffer(22, open.arguments),
+                Bind::storage_buffer(23, plain.arguments),
+                Bind::storage_buffer(24, others.arguments),
+                Bind::storage_image(25, others.tiles),
             ];
             let pipeline = ComputePipelineDesc {
                 constants: vec![(0, shape), (4, sizes.task_entries)],
@@ -301,6 +319,7 @@ impl Making {
         });
         let lists = Lists {
             tiles: open,
+            sorted: Some([plain, others]),
             lists,
             edges,
             triangles,

@@ -1,15 +1,18 @@
 //! The passes that work on the lists.
 
-use super::{Lists, Made, NAME, Sizes, texels};
-use crate::geometry::TILE_SIZE;
+use super::{Lists, Made, NAME, PARTS, Sizes, texels};
+use crate::geometry::{TILE_SIZE, TileList};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, BufferId, Graph, ImageId, PassKind, Stage};
+use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageId, PassKind, Stage};
 use crate::shadow::{ShadowInputs, shape_number};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
 /// Most workgroups along an axis that every device allows.
 const MOST_GROUPS: u32 = 65_535;
+
+/// Invocations of a workgroup: of `shaft_masks/masks.comp`.
+const INVOCATIONS: u32 = 16;
 
 /// Runs of nodes that one dispatch works on; it has a workgroup for each and each block of samples.
 pub(super) fn runs_in_dispatch(nodes: u32, sizes: &Sizes) -> u32 {
@@ -31,10 +34,15 @@ struct Push {
 }
 
 /// What the tiles are worked on for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 enum Step {
     /// The beginnings of their lists.
     Tiles,
+    /// The same of plain tiles, and of the others.
+    Plain(TileList),
+    Others(TileList),
+    /// Receivers among them whose numbers of triangles have no room in digits.
+    Spilled,
     /// The rest of long lists.
     Further,
     /// Triangles that lists do not know, among the nodes from the given run on.
@@ -62,12 +70,36 @@ impl Masks {
         let words = self.slots * words_of_tile(self.sizes.blocks);
         let words = texels(vk::Format::R32_UINT, words);
         let words = graph.create_image(format!("{NAME}.words{} {name}", self.label), words);
+        // Of a tile or each of its two parts, for each block of samples, the invocations of a workgroup.
+        let tasks = self.slots * PARTS * self.sizes.blocks * INVOCATIONS;
+        let tasks = texels(vk::Format::R32_UINT, tasks);
+        let sixteen = BufferDesc { size: 16 };
+        let named = |what: &str| format!("{NAME}.{what}{} {name}", self.label);
+        let mut spilled = TileList {
+            arguments: graph.create_buffer(named("spilled"), sixteen),
+            tiles: graph.create_image(named("spilled_tasks"), tasks),
+        };
+        // What is bound where nothing spills.
+        let mut none = TileList {
+            arguments: graph.create_buffer(named("none_spilled"), sixteen),
+            ..spilled
+        };
+        let mut pass = graph.pass(named("no_spilled"), PassKind::Transfer);
+        spilled.clear(&mut pass);
+        none.clear(&mut pass);
+        let cleared = [spilled, none];
+        pass.record(move |ctx| cleared.iter().try_for_each(|list| list.record_clear(ctx)));
         let mut made = (made, words);
         let runs = self.nodes / self.sizes.run_nodes + 1;
         let in_one = runs_in_dispatch(self.nodes, &self.sizes) as usize;
         let walks = (0..runs).step_by(in_one).map(Step::Walk);
-        for step in [Step::Tiles, Step::Further].into_iter().chain(walks) {
-            made = self.add_pass(graph, inputs, made, step);
+        let begins = match self.lists.sorted {
+            Some([plain, others]) => vec![Step::Others(others), Step::Plain(plain)],
+            None => vec![Step::Tiles],
+        };
+        let rest = [Step::Spilled, Step::Further];
+        for step in begins.into_iter().chain(rest).chain(walks) {
+            made = self.add_pass(graph, inputs, made, [&mut spilled, &mut none], step);
         }
         self.add_resolve(graph, inputs, made)
     }
@@ -77,6 +109,7 @@ impl Masks {
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
         (made, words): (Made, ImageId),
+        [spilled, none]: [&mut TileList; 2],
         step: Step,
     ) -> (Made, ImageId) {
         let name = &inputs.light_name;
@@ -95,6 +128,9 @@ impl Masks {
         } = self.lists;
         let (arguments, list, what) = match step {
             Step::Tiles => (tiles.arguments, tiles.tiles, "masks"),
+            Step::Plain(plain) => (plain.arguments, plain.tiles, "masks_plain"),
+            Step::Others(others) => (others.arguments, others.tiles, "masks"),
+            Step::Spilled => (spilled.arguments, tiles.tiles, "masks_spilled"),
             Step::Further => (further, tiles.tiles, "further"),
             Step::Walk(_) => (partial.arguments, partial.tiles, "walk"),
         };
@@ -125,26 +161,48 @@ impl Masks {
         pass.read(arguments, Access::Uniform(Stage::Compute));
         let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
         let estimates = pass.write(made.estimates, Access::StorageReadWrite(Stage::Compute));
-        let words = if step == Step::Tiles {
-            pass.overwrite(words, Access::StorageWrite(Stage::Compute))
+        let words = match step {
+            Step::Tiles | Step::Others(_) => {
+                pass.overwrite(words, Access::StorageWrite(Stage::Compute))
+            }
+            Step::Plain(_) | Step::Spilled => {
+                pass.write(words, Access::StorageWrite(Stage::Compute))
+            }
+            Step::Further | Step::Walk(_) => {
+                pass.write(words, Access::StorageReadWrite(Stage::Compute))
+            }
+        };
+        let spills = if matches!(step, Step::Tiles | Step::Others(_)) {
+            spilled.fill(&mut pass);
+            *spilled
         } else {
-            pass.write(words, Access::StorageReadWrite(Stage::Compute))
+            // The shader may write to it, for all that is known of it.
+            let written = Access::StorageReadWrite(Stage::Compute);
+            none.arguments = pass.write(none.arguments, written);
+            spilled.tiles = pass.write(spilled.tiles, written);
+            TileList {
+                arguments: none.arguments,
+                tiles: spilled.tiles,
+            }
         };
         let run = self.sizes.run_nodes;
         let (walk, first_run) = match step {
-            Step::Tiles | Step::Further => (0, 0),
             Step::Walk(first_run) => (1, first_run),
+            _ => (0, 0),
         };
         let push = Push {
             first_run,
             run,
-            further: u32::from(step == Step::Further),
+            further: u32::from(matches!(step, Step::Further)),
         };
         let constants = vec![
             (0, shape_number(&inputs.light.shape)),
             (1, walk),
+            (2, u32::from(matches!(step, Step::Plain(_)))),
             (3, u32::from(inputs.scene.has_masks())),
             (4, self.sizes.task_entries),
+            (5, u32::from(matches!(step, Step::Others(_)))),
+            (6, u32::from(matches!(step, Step::Spilled))),
         ];
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
@@ -168,6 +226,8 @@ impl Masks {
                 Bind::storage_image(16, words),
                 Bind::storage_image(17, triangles),
                 Bind::storage_image(18, estimates),
+                Bind::storage_buffer(19, spills.arguments),
+                Bind::storage_image(20, spills.tiles),
             ];
             let pipeline = ComputePipelineDesc {
                 constants,

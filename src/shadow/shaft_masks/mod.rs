@@ -19,7 +19,7 @@
 //! | `no_rest`, `settle` | lit and dark tiles settled, as far as a short walk tells |
 //! | `lists` | more lit tiles settled; candidates of the others |
 //! | `entries` | more lit tiles and dark ones settled; edges and triangles of the others |
-//! | `masks` | visibility of the others, or what the beginnings of long lists hide |
+//! | `masks_plain`, `masks` | visibility of the others, or what the beginnings of long lists hide |
 //! | `further` | what the rest of long lists hides |
 //! | `walk` | what triangles hide that lists had no room for |
 //! | `resolve` | visibility of the tiles of the last two, and where there are more than 64 samples |
@@ -96,6 +96,9 @@ const PARTS: u32 = 2;
 struct Lists {
     /// The tiles.
     tiles: TileList,
+    /// The same as two lists in one image: plain ones (`PLAIN` in `shaft_masks/masks.glsl`) from its begin on, others
+    /// from its end. `None` where they are not told apart.
+    sorted: Option<[TileList; 2]>,
     /// RGBA32_UINT, [`LIST_TEXELS`] texels a tile: `Entries` in `shaft_masks/lists.glsl`.
     lists: ImageId,
     /// R32_UINT: edges.

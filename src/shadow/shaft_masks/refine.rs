@@ -380,6 +380,7 @@ impl Choice<'_> {
         });
         masks.lists = Lists {
             tiles: selected,
+            sorted: None,
             lists,
             further,
             tasks,

@@ -257,6 +257,12 @@ int edge_rounds(Projection projection, uint code) {
     return before ? (ends ? -step : step) : 0;
 }
 
+// Triangles drawn one by one of a tile with more of which walks of its pixels (pixels.comp) take less time, for these see
+// far fewer. In finer meshes walks take longer.
+uint most_drawn() {
+    return clamp(params.counts.z / 512u, 512u, 4096u);
+}
+
 void main() {
     uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
     if (index >= arguments.count) {
@@ -378,18 +384,20 @@ void main() {
     uint edges = same ? 0u : edge_count;
     bool lit = complete && !dark && edges + whole_count + other_count == 0u && shaft.low.w > 0.0;
     bool settled = dark || lit;
+    // Without room for its edges a tile is looked at as if nothing was known of it. All have the same room, so that it
+    // is not by their order which of them have some.
+    bool fits = complete && edges <= params.pattern.z / arguments.count;
     if (lane == 0u) {
-        first_edge = atomicAdd(edges_used, complete && !settled ? edges : 0u);
+        first_edge = atomicAdd(edges_used, fits && !settled ? edges : 0u);
     }
     barrier();
-    // Without room for its edges a tile is looked at as if nothing was known of it.
-    bool fits = complete && first_edge + edges <= params.pattern.z;
     for (uint i = lane; i < edges && fits && !settled; i += gl_WorkGroupSize.x) {
         imageStore(edge_pool, triangle_texel_place(first_edge + i), uvec4(staged[i]));
     }
     uint whole = fits ? whole_count : 0u;
     uint others = fits ? other_count : 0u;
     uint resume = fits ? params.counts.z : 0u;
+    bool is_walked = whole + others > most_drawn();
     vec2 depths = fetch_part_depths(part);
     for (uint i = lane; i < TILE_SIZE * TILE_SIZE && dark; i += gl_WorkGroupSize.x) { // all is lit at the beginning
         // Stores beyond the picture's border are dropped.
@@ -399,7 +407,7 @@ void main() {
             imageStore(visibility, ivec2(pixel), vec4(0.0));
         }
     }
-    for (uint i = (lane + 1u) * TASK_ENTRIES; i < whole + others && !settled; i += gl_WorkGroupSize.x * TASK_ENTRIES) {
+    for (uint i = (lane + 1u) * TASK_ENTRIES; i < whole + others && !settled && !is_walked; i += gl_WorkGroupSize.x * TASK_ENTRIES) {
         uint task = atomicAdd(further.count, 1u);
         atomicMax(further.groups_x, min(task + 1u, TILE_ROW));
         atomicMax(further.groups_y, task / TILE_ROW + 1u);
@@ -407,14 +415,14 @@ void main() {
     }
     if (lane == 0u) {
         ivec2 at = list_place(part);
-        imageStore(lists, at, uvec4(candidates.xy, resume, settled ? TILE_SETTLED : TILE_OPEN));
+        imageStore(lists, at, uvec4(candidates.xy, resume, settled ? TILE_SETTLED : is_walked ? TILE_WALKED : TILE_OPEN));
         imageStore(lists, at + ivec2(1, 0), uvec4(first_edge, fits ? edges : 0u, first_triangle, candidates.y));
         imageStore(lists, at + ivec2(2, 0), uvec4(whole, others, tile.y * tiles.x + tile.x, 0u));
         uint work = (fits ? edges : 0u) + whole + others + (params.counts.z - resume);
         uint level = dark ? LEVEL_DARK : lit ? LEVEL_LIT : params.pattern.w;
         imageStore(estimates, estimate_place(part, ESTIMATE_WORK), uvec4(work));
         imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(level));
-        bool partly = resume < params.counts.z;
+        bool partly = resume < params.counts.z || is_walked;
         if (!settled) {
             uint slot = atomicAdd(open_tiles.count, 1u);
             atomicMax(open_tiles.groups_x, min(slot + 1u, TILE_ROW));

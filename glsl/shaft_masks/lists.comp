@@ -60,10 +60,11 @@ struct List {
     bool complete;
 };
 
-// Puts a chunk into the list, of whose triangles so many count: all but in the last one.
+// Puts a chunk into the list, of whose triangles so many count: all but in the last one. All tiles have room for as
+// many: so which of them have a list does not depend on their order.
 void list_chunk(inout List list, uint triangles[CHUNK], uint count) {
-    uint fresh = atomicAdd(chunks_used, 1u);
-    list.complete = fresh < params.counts.w;
+    list.complete = list.count < CHUNK * (params.counts.w / arguments.count);
+    uint fresh = list.complete ? atomicAdd(chunks_used, 1u) : 0u;
     if (list.complete) {
         for (uint i = 0u; i < CHUNK; i += 4u) {
             uvec4 four = uvec4(triangles[i], triangles[i + 1u], triangles[i + 2u], triangles[i + 3u]);

@@ -23,6 +23,7 @@ layout(constant_id = 4) const uint TASK_ENTRIES = 512u;
 const uint LIST_TEXELS = 3u;
 const uint TILE_OPEN = 0u;
 const uint TILE_SETTLED = 1u;
+const uint TILE_WALKED = 2u; // open, but its list is so long that walks of its pixels take less time
 
 // Entries of a tile. Triangles lie in one run of their pool, whole ones from its begin, others from
 // its end.

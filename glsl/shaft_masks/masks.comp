@@ -1,8 +1,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
-// Masks of the listed tiles, of tasks on the rest of long lists, or of runs of nodes that lists do not
-// know: a workgroup each, and of each block of samples. Four pixels an invocation, so that each fetch of an
-// edge or a triangle serves four.
+// Masks of the listed tiles, or of tasks on the rest of long lists: a workgroup each, and of each block of samples.
+// Four pixels an invocation, so that each fetch of an edge or a triangle serves four.
 
 #include "common/camera.glsl"
 #include "common/tiles.glsl"
@@ -11,8 +10,6 @@
 
 layout(local_size_x = 8, local_size_y = 2) in;
 
-// 1 for what lists do not know: a pipeline of its own, because it has code of its own.
-layout(constant_id = 1) const uint WALK = 0u;
 // 1 where tiles are listed from the end of their image on.
 layout(constant_id = 5) const uint FROM_END = 0u;
 
@@ -52,9 +49,7 @@ layout(constant_id = 6) const uint SPILLED = 0u;
 const uint INVOCATIONS = 16u;
 
 layout(push_constant) uniform Push {
-    uint first_run; // of nodes, of this dispatch
-    uint run;       // nodes of a run
-    uint further;   // 1 for the rest of long lists
+    uint further; // 1 for the rest of long lists
 } push;
 
 #define SUN_TANGENT_SQUARE (view.light.axis_x.w * view.light.axis_x.w)
@@ -121,7 +116,7 @@ uint store(uint slot, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 bloc
     }
     for (uint word = 0u; word < 2u; ++word) {
         ivec2 place = word_place(slot, pixel % TILE_SIZE, params.pattern.y, 2u * block + word);
-        if (WALK != 0u || push.further != 0u) {
+        if (push.further != 0u) {
             imageAtomicOr(words, place, blocked[word]);
         } else {
             imageStore(words, place, uvec4(blocked[word]));
@@ -205,7 +200,7 @@ void main() {
         return;
     }
     Entries entries = entries_of(imageLoad(lists, at + ivec2(1, 0)), imageLoad(lists, at + ivec2(2, 0)));
-    uint block = SPILLED != 0u ? own_task / INVOCATIONS % MOST_BLOCKS : gl_WorkGroupID.z % params.pattern.y;
+    uint block = SPILLED != 0u ? own_task / INVOCATIONS % MOST_BLOCKS : gl_WorkGroupID.z;
     uint invocation = SPILLED != 0u ? own_task % INVOCATIONS : gl_LocalInvocationIndex;
     fetch_light_rows(block);
 
@@ -220,102 +215,81 @@ void main() {
         || stored.z < params.counts.z;
 
     bool is_spilled = false;
-    if (WALK == 0u) {
-        Projection from[4];
-        uint digits[4][ROWS];
-        int sums[4];
+    Projection from[4];
+    uint digits[4][ROWS];
+    int sums[4];
+    [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+        from[i] = projection_from(receivers[i], row_rise());
+        sums[i] = 0;
+        for (uint r = 0u; r < ROWS; ++r) {
+            digits[i][r] = NO_DIGITS;
+        }
+    }
+    bool is_walked = stored.w == TILE_WALKED;
+    uint edges = push.further != 0u || is_walked ? 0u : entries.edges;
+    uint at_edge = 0u;
+    // Loops look at their end whether they go on: a driver without branches does one more turn of others, for
+    // nothing.
+    do {
+        if (at_edge < edges && SPILLED == 0u) {
+            uint code = imageLoad(edge_pool, triangle_texel_place(entries.first_edge + at_edge)).x;
+            vec3 a = fetch_edge_begin(code);
+            vec3 b = fetch_edge_end(code);
+            [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+                count_edge(from[i], a, b, code, digits[i], sums[i]);
+            }
+        }
+        at_edge += 1u;
+    } while (at_edge < edges);
+    [[unroll]] for (uint i = 0u; i < 4u && SPILLED == 0u; ++i) {
+        bool fits;
+        blocked[i] |= counted_mask(digits[i], sums[i], fits);
+        is_spilled = is_spilled || !fits;
+    }
+    // One receiver after the other.
+    for (uint at = 0u; at < 4u && SPILLED != 0u; ++at) {
+        vec3 position = receivers[0].position;
+        [[unroll]] for (uint i = 1u; i < 4u; ++i) {
+            position = i == at ? receivers[i].position : position;
+        }
+        Projection again = projection_from(MaskReceiver(position, 0u, true), row_rise());
+        uvec2 mask = counted_again(again, entries.first_edge, edges);
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-            from[i] = projection_from(receivers[i], row_rise());
-            sums[i] = 0;
-            for (uint r = 0u; r < ROWS; ++r) {
-                digits[i][r] = NO_DIGITS;
-            }
+            blocked[i] |= i == at ? mask : uvec2(0u);
         }
-        uint edges = push.further != 0u ? 0u : entries.edges;
-        uint at_edge = 0u;
-        // Loops look at their end whether they go on: a driver without branches does one more turn of others, for
-        // nothing.
-        do {
-            if (at_edge < edges && SPILLED == 0u) {
-                uint code = imageLoad(edge_pool, triangle_texel_place(entries.first_edge + at_edge)).x;
-                vec3 a = fetch_edge_begin(code);
-                vec3 b = fetch_edge_end(code);
-                [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-                    count_edge(from[i], a, b, code, digits[i], sums[i]);
-                }
-            }
-            at_edge += 1u;
-        } while (at_edge < edges);
-        [[unroll]] for (uint i = 0u; i < 4u && SPILLED == 0u; ++i) {
-            bool fits;
-            blocked[i] |= counted_mask(digits[i], sums[i], fits);
-            is_spilled = is_spilled || !fits;
-        }
-        // One receiver after the other.
-        for (uint at = 0u; at < 4u && SPILLED != 0u; ++at) {
-            vec3 position = receivers[0].position;
-            [[unroll]] for (uint i = 1u; i < 4u; ++i) {
-                position = i == at ? receivers[i].position : position;
-            }
-            Projection again = projection_from(MaskReceiver(position, 0u, true), row_rise());
-            uvec2 mask = counted_again(again, entries.first_edge, edges);
+    }
+    uint first = push.further != 0u ? task.y : 0u;
+    uint end = is_walked ? 0u : min(first + TASK_ENTRIES, entries.whole);
+    uint at_whole = first;
+    do {
+        if (at_whole < end) {
+            uint triangle = imageLoad(triangle_pool, triangle_texel_place(entries.first + at_whole)).x;
+            vec3 a = fetch_triangle_texel(4u * triangle).xyz;
+            vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
+            vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
             [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-                blocked[i] |= i == at ? mask : uvec2(0u);
+                add_whole(from[i], a, b, c, blocked[i]);
             }
         }
-        uint first = push.further != 0u ? task.y : 0u;
-        uint end = min(first + TASK_ENTRIES, entries.whole);
-        uint at_whole = first;
-        do {
-            if (at_whole < end) {
-                uint triangle = imageLoad(triangle_pool, triangle_texel_place(entries.first + at_whole)).x;
-                vec3 a = fetch_triangle_texel(4u * triangle).xyz;
-                vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
-                vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
-                [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-                    add_whole(from[i], a, b, c, blocked[i]);
-                }
-            }
-            at_whole += 1u;
-        } while (at_whole < end);
-        if (PLAIN == 0u) {
-            end = min(first + TASK_ENTRIES, entries.whole + entries.others);
-            LightFrom lights[4];
-            [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-                lights[i] = rows_from(view.light, receivers[i].position);
-            }
-            uint at_other = max(first, entries.whole);
-            do {
-                if (at_other < end) {
-                    uint place = entries.first + entries.room - 1u - (at_other - entries.whole);
-                    Blocker blocker = fetch_blocker(imageLoad(triangle_pool, triangle_texel_place(place)).x);
-                    add_blocker(receivers, lights, block, blocker, blocked);
-                }
-                at_other += 1u;
-            } while (at_other < end);
-        }
-    } else {
+        at_whole += 1u;
+    } while (at_whole < end);
+    if (PLAIN == 0u) {
+        end = is_walked ? 0u : min(first + TASK_ENTRIES, entries.whole + entries.others);
         LightFrom lights[4];
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {
             lights[i] = rows_from(view.light, receivers[i].position);
         }
-        // A walk can begin at any node: what is known of those above is only that they may be met.
-        uint first = (push.first_run + gl_WorkGroupID.z / params.pattern.y) * push.run;
-        uint node = max(first, stored.z);
-        uint end = min(first + push.run, params.counts.z);
-        Shaft shaft = fetch_shaft(part);
-        while (node < end) {
-            vec4 low = fetch_node_low(node);
-            bool leaf = low.w >= 0.0;
-            bool meets = shaft_meets_box(shaft, low.xyz, fetch_node_high(node).xyz);
-            node = leaf || meets ? node + 1u : uint(-low.w);
-            if (leaf && meets) {
-                Blocker blocker = fetch_blocker(uint(low.w));
+        uint at_other = max(first, entries.whole);
+        do {
+            if (at_other < end) {
+                uint place = entries.first + entries.room - 1u - (at_other - entries.whole);
+                Blocker blocker = fetch_blocker(imageLoad(triangle_pool, triangle_texel_place(place)).x);
                 add_blocker(receivers, lights, block, blocker, blocked);
             }
-        }
+            at_other += 1u;
+        } while (at_other < end);
     }
-    if (WALK == 0u && PLAIN == 0u && SPILLED == 0u && is_spilled) {
+    if (PLAIN == 0u && SPILLED == 0u && is_spilled) {
         list_spilled(entry, block);
         return;
     }

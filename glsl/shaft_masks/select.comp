@@ -115,14 +115,15 @@ void add_tile(uint entry, uvec2 part, uint slot) {
     imageStore(estimates, estimate_place(part, ESTIMATE_CHANGES), uvec4(0u));
     imageStore(estimates, estimate_place(part, ESTIMATE_BOUND), uvec4(0u));
     imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(params.pattern.w));
-    uint entries = second.x + second.y;
+    bool is_walked = candidates.w == TILE_WALKED;
+    uint entries = is_walked ? 0u : second.x + second.y;
     for (uint i = TASK_ENTRIES; i < entries; i += TASK_ENTRIES) {
         uint task = atomicAdd(further.count, 1u);
         atomicMax(further.groups_x, min(task + 1u, TILE_ROW));
         atomicMax(further.groups_y, task / TILE_ROW + 1u);
         imageStore(tasks, task_place(task), uvec4(entry, i, 0u, 0u));
     }
-    if (candidates.z < params.counts.z) {
+    if (is_walked || candidates.z < params.counts.z) {
         uint other = atomicAdd(partial.count, 1u);
         atomicMax(partial.groups_x, min(other + 1u, TILE_ROW));
         atomicMax(partial.groups_y, other / TILE_ROW + 1u);

@@ -1,8 +1,8 @@
 //! The passes that find what is between tiles and the light.
 
+use super::walk::{WalkRest, runs_in_dispatch};
 use super::{
-    CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, PARTS, POOL_WIDTH, Sizes, masks, part_list,
-    texels,
+    CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, PARTS, POOL_WIDTH, Sizes, part_list, texels,
 };
 use crate::geometry::{TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
@@ -29,6 +29,7 @@ struct Candidates {
     used: BufferId,
     further: BufferId,
     partial: TileList,
+    walk_rest: WalkRest,
     pieces: TileList,
     /// Tiles that masks are made of.
     open: TileList,
@@ -131,6 +132,7 @@ impl Making {
         let mut plain = part_list(graph, inputs, "plain");
         let mut sorted = part_list(graph, inputs, "sorted");
         let mut partial = part_list(graph, inputs, "partial");
+        let mut walk_rest = WalkRest::create(graph, inputs, "");
         let mut pieces = part_list(graph, inputs, "pieces");
         let sixteen = BufferDesc { size: 16 };
         let used = graph.create_buffer(format!("{NAME}.used {name}"), sixteen);
@@ -141,20 +143,21 @@ impl Making {
         plain.clear(&mut pass);
         sorted.clear(&mut pass);
         partial.clear(&mut pass);
+        walk_rest.arguments = pass.overwrite(walk_rest.arguments, Access::Clear);
         pieces.clear(&mut pass);
         let used = pass.overwrite(used, Access::Clear);
         let further = pass.overwrite(further, Access::Clear);
-        let runs = masks::runs_in_dispatch(inputs.scene.node_count() as u32, &sizes);
+        let runs = runs_in_dispatch(inputs.scene.node_count() as u32, &sizes);
         // Workgroups across, down, and for each block of samples; number of entries.
         let none = [0u32, 1, sizes.blocks, 0];
-        let no_partial = [0u32, 1, runs * sizes.blocks, 0];
         let arguments = [
             (penumbra.arguments, [0, 1, 1, 0]),
             (open.arguments, none),
             (plain.arguments, none),
             (sorted.arguments, none),
             (further, none),
-            (partial.arguments, no_partial),
+            (partial.arguments, none),
+            (walk_rest.arguments, [0, 1, runs * sizes.blocks, 0]),
             (pieces.arguments, [0, 1, 1, 0]),
             (used, [0; 4]),
         ];
@@ -218,6 +221,7 @@ impl Making {
             used,
             further,
             partial,
+            walk_rest,
             pieces,
             open,
             sorted: [plain, sorted],
@@ -241,6 +245,7 @@ impl Making {
             used,
             further,
             mut partial,
+            walk_rest,
             mut pieces,
             mut open,
             sorted: [plain, mut others],
@@ -326,6 +331,7 @@ impl Making {
             further,
             tasks,
             partial,
+            walk_rest,
             pieces,
         };
         let made = Made {

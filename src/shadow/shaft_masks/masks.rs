@@ -8,16 +8,8 @@ use crate::shadow::{ShadowInputs, shape_number};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-/// Most workgroups along an axis that every device allows.
-const MOST_GROUPS: u32 = 65_535;
-
 /// Invocations of a workgroup: of `shaft_masks/masks.comp`.
 const INVOCATIONS: u32 = 16;
-
-/// Runs of nodes that one dispatch works on; it has a workgroup for each and each block of samples.
-pub(super) fn runs_in_dispatch(nodes: u32, sizes: &Sizes) -> u32 {
-    (nodes / sizes.run_nodes + 1).min(MOST_GROUPS / sizes.blocks)
-}
 
 /// Words of a tile: two for each pixel and block of samples.
 pub(super) fn words_of_tile(blocks: u32) -> u32 {
@@ -28,8 +20,6 @@ pub(super) fn words_of_tile(blocks: u32) -> u32 {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 struct Push {
-    first_run: u32,
-    run: u32,
     further: u32,
 }
 
@@ -45,8 +35,6 @@ enum Step {
     Spilled,
     /// The rest of long lists.
     Further,
-    /// Triangles that lists do not know, among the nodes from the given run on.
-    Walk(u32),
 }
 
 /// What the passes share.
@@ -90,17 +78,15 @@ impl Masks {
         let cleared = [spilled, none];
         pass.record(move |ctx| cleared.iter().try_for_each(|list| list.record_clear(ctx)));
         let mut made = (made, words);
-        let runs = self.nodes / self.sizes.run_nodes + 1;
-        let in_one = runs_in_dispatch(self.nodes, &self.sizes) as usize;
-        let walks = (0..runs).step_by(in_one).map(Step::Walk);
         let begins = match self.lists.sorted {
             Some([plain, others]) => vec![Step::Others(others), Step::Plain(plain)],
             None => vec![Step::Tiles],
         };
         let rest = [Step::Spilled, Step::Further];
-        for step in begins.into_iter().chain(rest).chain(walks) {
+        for step in begins.into_iter().chain(rest) {
             made = self.add_pass(graph, inputs, made, [&mut spilled, &mut none], step);
         }
+        made.1 = self.add_walks(graph, inputs, made.1);
         self.add_resolve(graph, inputs, made)
     }
 
@@ -123,7 +109,6 @@ impl Masks {
             triangles,
             further,
             tasks,
-            partial,
             ..
         } = self.lists;
         let (arguments, list, what) = match step {
@@ -132,7 +117,6 @@ impl Masks {
             Step::Others(others) => (others.arguments, others.tiles, "masks"),
             Step::Spilled => (spilled.arguments, tiles.tiles, "masks_spilled"),
             Step::Further => (further, tiles.tiles, "further"),
-            Step::Walk(_) => (partial.arguments, partial.tiles, "walk"),
         };
         let label = &self.label;
         let mut pass = graph.pass(format!("{NAME}.{what}{label} {name}"), PassKind::Compute);
@@ -168,9 +152,7 @@ impl Masks {
             Step::Plain(_) | Step::Spilled => {
                 pass.write(words, Access::StorageWrite(Stage::Compute))
             }
-            Step::Further | Step::Walk(_) => {
-                pass.write(words, Access::StorageReadWrite(Stage::Compute))
-            }
+            Step::Further => pass.write(words, Access::StorageReadWrite(Stage::Compute)),
         };
         let spills = if matches!(step, Step::Tiles | Step::Others(_)) {
             spilled.fill(&mut pass);
@@ -185,19 +167,11 @@ impl Masks {
                 tiles: spilled.tiles,
             }
         };
-        let run = self.sizes.run_nodes;
-        let (walk, first_run) = match step {
-            Step::Walk(first_run) => (1, first_run),
-            _ => (0, 0),
-        };
         let push = Push {
-            first_run,
-            run,
             further: u32::from(matches!(step, Step::Further)),
         };
         let constants = vec![
             (0, shape_number(&inputs.light.shape)),
-            (1, walk),
             (2, u32::from(matches!(step, Step::Plain(_)))),
             (3, u32::from(inputs.scene.has_masks())),
             (4, self.sizes.task_entries),

@@ -21,7 +21,8 @@
 //! | `entries` | more lit tiles and dark ones settled; edges and triangles of the others |
 //! | `masks_plain`, `masks` | visibility of the others, or what the beginnings of long lists hide |
 //! | `further` | what the rest of long lists hides |
-//! | `walk` | what triangles hide that lists had no room for |
+//! | `walk` | what triangles hide that lists had no room for, each pixel by itself |
+//! | `walk_rest` | the rest of long walks |
 //! | `resolve` | visibility of the tiles of the last two, and where there are more than 64 samples |
 //! | `no_estimates` | the tiles' estimates, which `entries`, `masks` and `resolve` fill in |
 //! | `rounds`, `select` | the tiles that get four times the samples |
@@ -34,6 +35,7 @@ mod masks;
 mod options;
 mod refine;
 mod samples;
+mod walk;
 
 pub use options::ShaftOptions;
 pub(super) use refine::missed_bound;
@@ -111,6 +113,7 @@ struct Lists {
     tasks: ImageId,
     /// Tiles whose lists do not know all triangles.
     partial: TileList,
+    walk_rest: walk::WalkRest,
     /// Tiles whose masks are made in pieces: of long lists, or of several blocks of samples.
     pieces: TileList,
 }
@@ -135,7 +138,7 @@ impl Sizes {
         // A small picture's tiles are wide, and so are their shafts.
         let rows = (tiles.max(LEAST_TILES) * options.room).div_ceil(POOL_WIDTH);
         // A cut-out triangle costs a look for each sample, others a few operations a row.
-        let (task_entries, run_nodes) = if masked { (128, 256) } else { (512, 1024) };
+        let (task_entries, run_nodes) = if masked { (128, 230) } else { (512, 5120) };
         Self {
             pool_rows: rows.min(MOST_POOL_ROWS),
             edge_rows: rows.div_ceil(4).min(MOST_POOL_ROWS),

@@ -7,7 +7,8 @@
 //! proven bound is too large. The tiles' lists are those of the first masks.
 
 use super::bound::no_bound;
-use super::masks::{Masks, runs_in_dispatch, words_of_tile};
+use super::masks::{Masks, words_of_tile};
+use super::walk::{WalkRest, runs_in_dispatch};
 use super::{BLOCK, Lists, Made, NAME, PARTS, POOL_WIDTH, ShaftOptions, Sizes};
 use super::{add_params, part_list, texels};
 use crate::geometry::tile_counts;
@@ -305,17 +306,20 @@ impl Choice<'_> {
         let sizes = masks.sizes;
         let mut selected = part_list(graph, inputs, &format!("selected{label}"));
         let mut partial = part_list(graph, inputs, &format!("partial{label}"));
+        let mut walk_rest = WalkRest::create(graph, inputs, &label);
         let sixteen = BufferDesc { size: 16 };
         let further = graph.create_buffer(format!("{NAME}.further{label} {name}"), sixteen);
         let mut pass = graph.pass(format!("{NAME}.clear{label} {name}"), PassKind::Transfer);
         selected.clear(&mut pass);
         partial.clear(&mut pass);
         let further = pass.overwrite(further, Access::Clear);
+        walk_rest.arguments = pass.overwrite(walk_rest.arguments, Access::Clear);
         let runs = runs_in_dispatch(masks.nodes, &sizes);
         let arguments = [
             (selected.arguments, [0u32, 1, sizes.blocks, 0]),
             (further, [0, 1, sizes.blocks, 0]),
-            (partial.arguments, [0, 1, runs * sizes.blocks, 0]),
+            (partial.arguments, [0, 1, sizes.blocks, 0]),
+            (walk_rest.arguments, [0, 1, runs * sizes.blocks, 0]),
         ];
         pass.record(move |ctx| {
             for (buffer, values) in arguments {
@@ -385,6 +389,7 @@ impl Choice<'_> {
             further,
             tasks,
             partial,
+            walk_rest,
             pieces: selected,
             ..masks.lists
         };

@@ -337,12 +337,13 @@ fn a_scene_without_a_camera_is_seen_whole() -> Result {
 #[test]
 fn visibility_is_the_same_in_every_run_and_with_any_number_of_threads() -> Result {
     let folder = tempfile::tempdir()?;
-    // The last two have more edges and leaves before some tiles than lists have room for.
+    // The last ones have more edges and leaves before some tiles than lists have room for.
     let cases = [
         (SPHERE, "auto"),
         (COURT, "auto"),
         (FOLIAGE, "dbuffer:room=2"),
         (FOLIAGE, "dbuffer:room=8"),
+        (FOLIAGE, "shaft-masks:room=8"),
     ];
     for (scene, technique) in cases {
         let mut seen: Option<Vec<u8>> = None;

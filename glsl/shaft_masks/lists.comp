@@ -52,6 +52,9 @@ vec4 fetch_shaft_texel(ivec2 place) {
     return imageLoad(shafts, place);
 }
 
+// 1 where all lists are made again, each with the same room: overflow.comp.
+layout(constant_id = 1) const uint AGAIN = 0u;
+
 // Where a tile's list goes on.
 struct List {
     uint first; // its first chunk
@@ -60,11 +63,11 @@ struct List {
     bool complete;
 };
 
-// Puts a chunk into the list, of whose triangles so many count: all but in the last one. All tiles have room for as
-// many: so which of them have a list does not depend on their order.
+// Puts a chunk into the list, of whose triangles so many count: all but in the last one.
 void list_chunk(inout List list, uint triangles[CHUNK], uint count) {
-    list.complete = list.count < CHUNK * (params.counts.w / arguments.count);
+    list.complete = AGAIN == 0u || list.count < CHUNK * (params.counts.w / arguments.count);
     uint fresh = list.complete ? atomicAdd(chunks_used, 1u) : 0u;
+    list.complete = list.complete && fresh < params.counts.w;
     if (list.complete) {
         for (uint i = 0u; i < CHUNK; i += 4u) {
             uvec4 four = uvec4(triangles[i], triangles[i + 1u], triangles[i + 2u], triangles[i + 3u]);
@@ -139,11 +142,13 @@ void main() {
     if (!lit && count > 0u && found.complete) {
         list_chunk(found, waiting, count);
     }
-    if (!lit) {
+    if (!lit && AGAIN == 0u) {
         uint at = atomicAdd(penumbra.count, 1u);
         atomicMax(penumbra.groups_x, min(at + 1u, TILE_ROW));
         atomicMax(penumbra.groups_y, at / TILE_ROW + 1u);
         imageStore(penumbra_list, tile_entry_place(at, tiles), uvec4(entry));
+    }
+    if (!lit) {
         uint resume = found.complete ? nodes : 0u;
         imageStore(lists, list_place(part), uvec4(found.first, found.count, resume, TILE_OPEN));
     }

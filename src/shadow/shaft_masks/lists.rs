@@ -21,6 +21,16 @@ pub(super) struct Making {
     pub estimates: ImageId,
 }
 
+/// What the passes that list candidates write.
+#[derive(Clone, Copy)]
+struct Listed {
+    penumbra: TileList,
+    used: BufferId,
+    pool: ImageId,
+    lists: ImageId,
+    estimates: ImageId,
+}
+
 /// Candidates of tiles, between the two passes.
 struct Candidates {
     tiles: TileList,
@@ -126,7 +136,7 @@ impl Making {
         let name = &inputs.light_name;
         let size = inputs.camera.size();
         let [across, down] = tile_counts(size);
-        let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
+        let sizes = self.sizes;
         let mut penumbra = part_list(graph, inputs, "penumbra");
         let mut open = part_list(graph, inputs, "open");
         let mut plain = part_list(graph, inputs, "plain");
@@ -174,46 +184,23 @@ impl Making {
         let format = vk::Format::R32G32B32A32_UINT;
         let desc = ImageDesc::new(format, across * LIST_TEXELS, down * PARTS);
         let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
-        let (hierarchy, triangles) = (inputs.ids.hierarchy, inputs.ids.triangles);
-        let (view_params, part) = inputs.view_params;
-        let shape = shape_number(&inputs.light.shape);
-        let mut pass = graph.pass(format!("{NAME}.lists {name}"), PassKind::Compute);
-        pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
-        pass.read(params, Access::Uniform(Stage::Compute));
-        for image in [hierarchy, triangles, shafts] {
-            pass.read(image, Access::StorageRead(Stage::Compute));
-        }
-        rest.read(&mut pass);
-        penumbra.fill(&mut pass);
-        let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
-        let pool = pass.overwrite(pool, Access::StorageWrite(Stage::Compute));
-        let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
-        let estimates = pass.write(made.estimates, Access::StorageWrite(Stage::Compute));
-        pass.record(move |ctx| {
-            let nearest = SamplerDesc::nearest();
-            let bindings = [
-                Bind::uniform(0, view_params).part(part),
-                Bind::uniform(1, params),
-                Bind::storage_image(2, hierarchy),
-                Bind::uniform(3, rest.arguments),
-                Bind::sampled(4, rest.tiles, nearest),
-                Bind::storage_image(5, shafts),
-                Bind::storage_image(6, triangles),
-                Bind::storage_buffer(7, penumbra.arguments),
-                Bind::storage_image(8, penumbra.tiles),
-                Bind::storage_buffer(9, used),
-                Bind::storage_image(10, pool),
-                Bind::storage_image(11, lists),
-                Bind::storage_image(12, estimates),
-            ];
-            let shader = &spirv::SHAFT_MASKS_LISTS_COMP;
-            let pipeline = ComputePipelineDesc {
-                constants: vec![(0, shape)],
-                ..ComputePipelineDesc::new(shader)
-            };
-            ctx.bind_compute(&pipeline, &bindings, &[])?;
-            rest.dispatch(ctx)
-        });
+        let mut listed = Listed {
+            penumbra,
+            used,
+            pool,
+            lists,
+            estimates: made.estimates,
+        };
+        self.add_lists(graph, inputs, rest, &mut listed, None);
+        let again = self.add_overflow(graph, inputs, rest, &mut listed);
+        self.add_lists(graph, inputs, rest, &mut listed, Some(again));
+        let Listed {
+            penumbra,
+            used,
+            pool,
+            lists,
+            estimates,
+        } = listed;
         let candidates = Candidates {
             tiles: penumbra,
             lists,
@@ -227,6 +214,107 @@ impl Making {
             sorted: [plain, sorted],
         };
         (candidates, Made { estimates, ..made })
+    }
+
+    /// Declares the pass that lists candidates, or lists them again with the same room for all tiles: by the given
+    /// arguments.
+    fn add_lists(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        rest: TileList,
+        made: &mut Listed,
+        again: Option<BufferId>,
+    ) {
+        let name = &inputs.light_name;
+        let (params, shafts) = (self.params, self.shafts);
+        let (hierarchy, triangles) = (inputs.ids.hierarchy, inputs.ids.triangles);
+        let (view_params, part) = inputs.view_params;
+        let shape = shape_number(&inputs.light.shape);
+        let suffix = again.map_or("", |_| ".again");
+        let mut pass = graph.pass(format!("{NAME}.lists{suffix} {name}"), PassKind::Compute);
+        pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+        pass.read(params, Access::Uniform(Stage::Compute));
+        for image in [hierarchy, triangles, shafts] {
+            pass.read(image, Access::StorageRead(Stage::Compute));
+        }
+        rest.read(&mut pass);
+        let written = Access::StorageWrite(Stage::Compute);
+        if let Some(again) = again {
+            pass.read(again, Access::Indirect);
+            made.penumbra.arguments = pass.write(
+                made.penumbra.arguments,
+                Access::StorageReadWrite(Stage::Compute),
+            );
+            made.penumbra.tiles = pass.write(made.penumbra.tiles, written);
+            made.pool = pass.write(made.pool, written);
+            made.lists = pass.write(made.lists, written);
+        } else {
+            made.penumbra.fill(&mut pass);
+            made.pool = pass.overwrite(made.pool, written);
+            made.lists = pass.overwrite(made.lists, written);
+        }
+        made.used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
+        made.estimates = pass.write(made.estimates, written);
+        let made = *made;
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let bindings = [
+                Bind::uniform(0, view_params).part(part),
+                Bind::uniform(1, params),
+                Bind::storage_image(2, hierarchy),
+                Bind::uniform(3, rest.arguments),
+                Bind::sampled(4, rest.tiles, nearest),
+                Bind::storage_image(5, shafts),
+                Bind::storage_image(6, triangles),
+                Bind::storage_buffer(7, made.penumbra.arguments),
+                Bind::storage_image(8, made.penumbra.tiles),
+                Bind::storage_buffer(9, made.used),
+                Bind::storage_image(10, made.pool),
+                Bind::storage_image(11, made.lists),
+                Bind::storage_image(12, made.estimates),
+            ];
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(0, shape), (1, u32::from(again.is_some()))],
+                ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_LISTS_COMP)
+            };
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            ctx.dispatch_indirect(again.unwrap_or(rest.arguments), 0)
+        });
+    }
+
+    /// Declares the pass that finds out whether lists have to be made again; returns arguments of that dispatch.
+    fn add_overflow(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        rest: TileList,
+        made: &mut Listed,
+    ) -> BufferId {
+        let name = &inputs.light_name;
+        let params = self.params;
+        let again = BufferDesc { size: 16 };
+        let again = graph.create_buffer(format!("{NAME}.overflow {name}"), again);
+        let mut pass = graph.pass(format!("{NAME}.overflow {name}"), PassKind::Compute);
+        for buffer in [params, rest.arguments] {
+            pass.read(buffer, Access::Uniform(Stage::Compute));
+        }
+        made.used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
+        let again = pass.overwrite(again, Access::StorageWrite(Stage::Compute));
+        let used = made.used;
+        pass.record(move |ctx| {
+            let bindings = [
+                Bind::uniform(0, params),
+                Bind::uniform(1, rest.arguments),
+                Bind::storage_buffer(2, used),
+                Bind::storage_buffer(3, again),
+            ];
+            let pipeline = ComputePipelineDesc::new(&spirv::SHAFT_MASKS_OVERFLOW_COMP);
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            ctx.dispatch([1, 1, 1]);
+            Ok(())
+        });
+        again
     }
 
     fn add_entries(

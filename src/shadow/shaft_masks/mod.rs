@@ -18,6 +18,7 @@
 //! | `shafts`, `shafts_rough` | the tiles, in two parts where they span a gap in depth; their shafts, and boxes around their surfaces |
 //! | `no_rest`, `settle` | lit and dark tiles settled, as far as a short walk tells |
 //! | `lists` | more lit tiles settled; candidates of the others |
+//! | `overflow`, `lists.again` | the same with equal room for all, where they had too little |
 //! | `entries` | more lit tiles and dark ones settled; edges and triangles of the others |
 //! | `masks_plain`, `masks` | visibility of the others, or what the beginnings of long lists hide |
 //! | `further` | what the rest of long lists hides |
@@ -141,7 +142,7 @@ impl Sizes {
         let (task_entries, run_nodes) = if masked { (128, 230) } else { (512, 5120) };
         Self {
             pool_rows: rows.min(MOST_POOL_ROWS),
-            edge_rows: rows.div_ceil(4).min(MOST_POOL_ROWS),
+            edge_rows: rows.div_ceil(2).min(MOST_POOL_ROWS),
             task_entries,
             run_nodes,
             blocks: (options.side / BLOCK).pow(2),

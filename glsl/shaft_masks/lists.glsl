@@ -1,12 +1,12 @@
 // What is between a tile's surfaces and the light.
 //
 // The walk down the hierarchy lists candidates: chunks of a pool, linked, so that a list may have any
-// length. Where the pool is used up, or a walk long, the list is not used.
+// length. Where the pool is used up all lists are made again, each with the same room (overflow.comp).
 // Entries for the masks are made from candidates and lie side by side.
 //
 // A long list is worked on in tasks of a fixed number of triangles. The first one is its tile's; the
-// others OR what they find to the tile's masks in memory. For a tile without a list the hierarchy is
-// walked anew, by tasks of a fixed number of nodes. That spreads the work, and a software
+// others OR what they find to the tile's masks in memory. Of a tile with no list, or one with too many
+// triangles, each pixel walks down the hierarchy anew (pixels.comp). That spreads the work, and a software
 // driver may end loops that go on for long.
 #ifndef ANTUMBRA_SHAFT_MASKS_LISTS_GLSL
 #define ANTUMBRA_SHAFT_MASKS_LISTS_GLSL

@@ -195,7 +195,7 @@ uvec2 cells_of_blocker(MaskReceiver receiver, LightFrom light, Blocker blocker) 
 
 void main() {
     uint index = gl_WorkGroupID.y * TILE_ROW + gl_WorkGroupID.x;
-    if (index >= arguments.count || gl_WorkGroupID.z > 0u) {
+    if (index >= arguments.count) {
         return;
     }
     uvec2 tiles = (params.counts.xy + TILE_SIZE - 1u) / TILE_SIZE;

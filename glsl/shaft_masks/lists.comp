@@ -26,7 +26,8 @@ layout(set = 0, binding = 4) uniform usampler2D list;
 layout(set = 0, binding = 5, rgba32f) uniform readonly image2D shafts;
 layout(set = 0, binding = 6, rgba32f) uniform readonly image2D triangles;
 layout(set = 0, binding = 7, std430) buffer PenumbraArguments {
-    TileArguments penumbra;
+    TileArguments penumbra; // a workgroup each
+    TileArguments penumbra_groups; // an invocation each
 };
 layout(set = 0, binding = 8, r32ui) uniform writeonly uimage2D penumbra_list;
 layout(set = 0, binding = 9, std430) buffer Pool {
@@ -129,6 +130,8 @@ void main() {
         more = found.complete && node < nodes;
     }
 
+    // A driver may end the loops above by itself, too.
+    found.complete = found.complete && node >= nodes;
     uint short_list[SHORT_LIST];
     for (uint i = 0u; i < SHORT_LIST; ++i) {
         short_list[i] = waiting[i];
@@ -146,6 +149,7 @@ void main() {
         uint at = atomicAdd(penumbra.count, 1u);
         atomicMax(penumbra.groups_x, min(at + 1u, TILE_ROW));
         atomicMax(penumbra.groups_y, at / TILE_ROW + 1u);
+        atomicMax(penumbra_groups.groups_x, at / PARTS_A_GROUP + 1u);
         imageStore(penumbra_list, tile_entry_place(at, tiles), uvec4(entry));
     }
     if (!lit) {

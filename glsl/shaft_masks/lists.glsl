@@ -19,8 +19,10 @@ const uint CHUNK = 32u;
 layout(constant_id = 4) const uint TASK_ENTRIES = 512u;
 
 // Texels of a tile in the image of lists, side by side: first chunk of candidates, their number, node
-// to walk from (beyond the last one if the list is whole, else 0), state; entries as below.
-const uint LIST_TEXELS = 3u;
+// to walk from (beyond the last one if the list is whole, else 0), state; entries as below; what their edges
+// count in sum, whether any of them meets the shaft, number of triangles that may cover all of the light; the first
+// of these.
+const uint LIST_TEXELS = 6u;
 const uint TILE_OPEN = 0u;
 const uint TILE_SETTLED = 1u;
 const uint TILE_WALKED = 2u; // open, but its list is so long that walks of its pixels take less time
@@ -65,7 +67,10 @@ const uint EDGE_CORNER_BITS = 2u;
 const uint EDGE_DOUBLE = 0x40000000u;
 const uint EDGE_TURNED = 0x80000000u;
 
-// Most that edges of one tile may count in sum: an invocation that lists them has room for no more.
+// Most that edges of one tile may count in sum.
 const uint MOST_COUNT = 2048u;
+
+// Triangles of a tile that are looked at as ones that may cover all of the light: two texels.
+const uint MOST_COVERS = 8u;
 
 #endif

@@ -12,6 +12,9 @@ layout(local_size_x = 8, local_size_y = 2) in;
 
 // 1 where tiles are listed from the end of their image on.
 layout(constant_id = 5) const uint FROM_END = 0u;
+// 1 where masks are made in pieces, which words in memory bring together. Others go straight to visibility: a driver
+// without branches goes through stores that are not made.
+layout(constant_id = 7) const uint WORDS = 0u;
 
 layout(set = 0, binding = 0, std140) uniform ViewBlock {
     ViewParams view;
@@ -102,19 +105,19 @@ MaskReceiver fetch_receiver(uvec2 pixel, vec2 depths, out uvec2 blocked) {
 }
 
 // Stores what a receiver sees; returns its part of its tile's ESTIMATE_CHANGES.
-uint store(uint slot, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 blocked, bool in_parts) {
+uint store(uint slot, uint block, uvec2 pixel, MaskReceiver receiver, uvec2 blocked, bool in_pieces) {
     if (!receiver.in_part) {
         return 0u;
     }
     blocked = receiver.id == 0u ? uvec2(0u) : blocked;
-    if (!in_parts) {
+    if (!in_pieces) {
         // Stores beyond the picture's border are dropped.
         int hidden = bitCount(blocked.x) + bitCount(blocked.y);
         float samples = float(ROWS * COLUMNS);
         imageStore(visibility, ivec2(pixel), vec4((samples - float(hidden)) / samples));
         return all(lessThan(pixel, params.counts.xy)) ? changed_pixel(changes_in(blocked, LIGHT_SHAPE == LIGHT_LINE)) : 0u;
     }
-    for (uint word = 0u; word < 2u; ++word) {
+    for (uint word = 0u; word < 2u && WORDS != 0u; ++word) {
         ivec2 place = word_place(slot, pixel % TILE_SIZE, params.pattern.y, 2u * block + word);
         if (push.further != 0u) {
             imageAtomicOr(words, place, blocked[word]);
@@ -211,8 +214,9 @@ void main() {
         pixels[i] = tile * TILE_SIZE + uvec2(invocation % TILE_SIZE, invocation / TILE_SIZE + 2u * i);
         receivers[i] = fetch_receiver(pixels[i], depths, blocked[i]);
     }
-    bool in_parts = params.pattern.y > 1u || entries.whole + entries.others > TASK_ENTRIES
+    bool in_pieces = params.pattern.y > 1u || entries.whole + entries.others > TASK_ENTRIES
         || stored.z < params.counts.z;
+    in_pieces = WORDS != 0u && in_pieces;
 
     bool is_spilled = false;
     Projection from[4];
@@ -289,13 +293,13 @@ void main() {
             at_other += 1u;
         } while (at_other < end);
     }
-    if (PLAIN == 0u && SPILLED == 0u && is_spilled) {
+    if (SPILLED == 0u && is_spilled) {
         list_spilled(entry, block);
         return;
     }
     uint changes = 0u;
     [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-        changes += store(entries.slot, block, pixels[i], receivers[i], blocked[i], in_parts);
+        changes += store(entries.slot, block, pixels[i], receivers[i], blocked[i], in_pieces);
     }
     if (changes > 0u) {
         imageAtomicAdd(estimates, estimate_place(part, ESTIMATE_CHANGES), changes);

@@ -16,8 +16,8 @@
 
 // 1 where triangles of the scene may have holes.
 layout(constant_id = 3) const uint MASKED = 0u;
-// 1 for tiles of few edges, MOST_PLAIN in sum, and no triangles but whole ones, whose surfaces have all of the light above
-// them: a pipeline of its own, because one without branches goes through what it does for others.
+// 1 for tiles with no triangles but whole ones, whose surfaces have all of the light above them: a pipeline of its own,
+// because a driver without branches goes through what it does for others.
 layout(constant_id = 2) const uint PLAIN = 0u;
 
 // The light as a receiver sees it: its samples are center + u x + v y, from the receiver.
@@ -173,10 +173,8 @@ bool crosses(vec4 row, Side side) {
 
 // Numbers of triangles before samples: a word of eight digits for each row. Below nothing there is some room for
 // rounding, and above it for 13 triangles. Sums of edges may leave that range on their way; where their end does,
-// digits spill into each other. Then their sum is not that of the numbers, which is kept beside them. Those of plain
-// tiles cannot spill: there is room for all edges on either side of nothing.
-const uint MOST_PLAIN = 7u;
-const uint NO_DIGITS = PLAIN != 0u ? 0x77777777u : 0x22222222u;
+// digits spill into each other. Then their sum is not that of the numbers, which is kept beside them.
+const uint NO_DIGITS = 0x22222222u;
 const uint ONE_DIGIT = 0x11111111u;
 
 struct Edge {
@@ -203,7 +201,7 @@ void count_edge(Projection projection, vec3 from, vec3 to, uint code, inout uint
     for (uint r = 0u; r < ROWS; ++r) {
         uint before = crosses(light_rows[r], edge.side) ? quads_before_side(r, edge.side) : 32u;
         digits[r] += before < 32u ? step << before : 0u;
-        quads += PLAIN != 0u ? 0u : before;
+        quads += before;
     }
     sum += weight * int(32u * ROWS - quads);
 }
@@ -222,7 +220,7 @@ uvec2 counted_mask(uint digits[ROWS], int sum, out bool fits) {
         off = (off | off >> 6) & 0x000f000fu;
         blocked[r / 4u] |= ((off | off >> 12) & 0xffu) << (8u * (r % 4u));
     }
-    fits = PLAIN != 0u || 4 * (int(total) - int(2u * COLUMNS * ROWS)) == sum;
+    fits = 4 * (int(total) - int(2u * COLUMNS * ROWS)) == sum;
     return fits ? blocked : uvec2(0u);
 }
 

@@ -22,6 +22,7 @@ layout(set = 0, binding = 1, r32ui) uniform uimage2D estimates;
 layout(set = 0, binding = 2, rgba32ui) uniform uimage2D lists;
 layout(set = 0, binding = 3, std430) buffer TileListArguments {
     TileArguments selected;
+    TileArguments blocks_of_selected;
 };
 layout(set = 0, binding = 4, r32ui) uniform writeonly uimage2D selected_list;
 layout(set = 0, binding = 5, std430) buffer TaskArguments {
@@ -228,6 +229,8 @@ void main() {
                 atomicMax(selected.count, slot + 1u);
                 atomicMax(selected.groups_x, min(slot + 1u, TILE_ROW));
                 atomicMax(selected.groups_y, slot / TILE_ROW + 1u);
+                atomicMax(blocks_of_selected.groups_x, min(slot + 1u, TILE_ROW));
+                atomicMax(blocks_of_selected.groups_y, slot / TILE_ROW + 1u);
                 atomicMax(spent.work, work);
             }
         }

@@ -2,7 +2,8 @@
 
 use super::walk::{WalkRest, runs_in_dispatch};
 use super::{
-    CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, PARTS, POOL_WIDTH, Sizes, part_list, texels,
+    CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, OTHER_DISPATCH, PARTS, POOL_WIDTH, Sizes, part_list,
+    part_list_for_two, texels,
 };
 use crate::geometry::{TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
@@ -63,7 +64,8 @@ impl Making {
         };
         let (rest, made) = self.add_settled(graph, inputs, parts, made);
         let (candidates, made) = self.add_candidates(graph, inputs, rest, made);
-        self.add_entries(graph, inputs, candidates, made)
+        let (candidates, entries) = self.add_entries(graph, inputs, candidates);
+        self.add_classes(graph, inputs, candidates, entries, made)
     }
 
     /// Declares the passes that settle tiles by a short walk; returns the list of the others.
@@ -137,13 +139,13 @@ impl Making {
         let size = inputs.camera.size();
         let [across, down] = tile_counts(size);
         let sizes = self.sizes;
-        let mut penumbra = part_list(graph, inputs, "penumbra");
+        let mut penumbra = part_list_for_two(graph, inputs, "penumbra");
         let mut open = part_list(graph, inputs, "open");
         let mut plain = part_list(graph, inputs, "plain");
         let mut sorted = part_list(graph, inputs, "sorted");
         let mut partial = part_list(graph, inputs, "partial");
         let mut walk_rest = WalkRest::create(graph, inputs, "");
-        let mut pieces = part_list(graph, inputs, "pieces");
+        let mut pieces = part_list_for_two(graph, inputs, "pieces");
         let sixteen = BufferDesc { size: 16 };
         let used = graph.create_buffer(format!("{NAME}.used {name}"), sixteen);
         let further = graph.create_buffer(format!("{NAME}.further {name}"), sixteen);
@@ -159,21 +161,24 @@ impl Making {
         let further = pass.overwrite(further, Access::Clear);
         let runs = runs_in_dispatch(inputs.scene.node_count() as u32, &sizes);
         // Workgroups across, down, and for each block of samples; number of entries.
-        let none = [0u32, 1, sizes.blocks, 0];
+        let none = [0u32, 1, 1, 0];
+        let of_blocks = [0, 1, sizes.blocks, 0];
         let arguments = [
-            (penumbra.arguments, [0, 1, 1, 0]),
-            (open.arguments, none),
-            (plain.arguments, none),
-            (sorted.arguments, none),
-            (further, none),
-            (partial.arguments, none),
-            (walk_rest.arguments, [0, 1, runs * sizes.blocks, 0]),
-            (pieces.arguments, [0, 1, 1, 0]),
-            (used, [0; 4]),
+            (penumbra.arguments, 0, none),
+            (penumbra.arguments, OTHER_DISPATCH, none),
+            (open.arguments, 0, none),
+            (plain.arguments, 0, none),
+            (sorted.arguments, 0, none),
+            (further, 0, of_blocks),
+            (partial.arguments, 0, of_blocks),
+            (walk_rest.arguments, 0, [0, 1, runs * sizes.blocks, 0]),
+            (pieces.arguments, 0, none),
+            (pieces.arguments, OTHER_DISPATCH, of_blocks),
+            (used, 0, [0; 4]),
         ];
         pass.record(move |ctx| {
-            for (buffer, values) in arguments {
-                ctx.update_buffer(buffer, 0, bytemuck::cast_slice(&values))?;
+            for (buffer, offset, values) in arguments {
+                ctx.update_buffer(buffer, offset, bytemuck::cast_slice(&values))?;
             }
             Ok(())
         });
@@ -317,13 +322,14 @@ impl Making {
         again
     }
 
+    /// Declares the pass that makes entries for the masks from candidates; returns what it makes with them, and the
+    /// images of edges and triangles.
     fn add_entries(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
         candidates: Candidates,
-        made: Made,
-    ) -> (Lists, Made) {
+    ) -> (Candidates, [ImageId; 2]) {
         let name = &inputs.light_name;
         let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
         let Candidates {
@@ -331,29 +337,89 @@ impl Making {
             lists,
             pool,
             used,
+            ..
+        } = candidates;
+        let edges = texels(vk::Format::R32_UINT, sizes.edge_rows * POOL_WIDTH);
+        let edges = graph.create_image(format!("{NAME}.edges {name}"), edges);
+        let triangles = texels(vk::Format::R32_UINT, sizes.pool_rows * POOL_WIDTH);
+        let triangles = graph.create_image(format!("{NAME}.triangles {name}"), triangles);
+        let ids = inputs.ids;
+        let (view_params, part) = inputs.view_params;
+        let shape = shape_number(&inputs.light.shape);
+        let mut pass = graph.pass(format!("{NAME}.entries {name}"), PassKind::Compute);
+        pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
+        pass.read(params, Access::Uniform(Stage::Compute));
+        for image in [ids.triangles, ids.neighbours, shafts, pool] {
+            pass.read(image, Access::StorageRead(Stage::Compute));
+        }
+        tiles.read(&mut pass);
+        let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
+        let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
+        let edges = pass.overwrite(edges, Access::StorageWrite(Stage::Compute));
+        let triangles = pass.overwrite(triangles, Access::StorageWrite(Stage::Compute));
+        pass.record(move |ctx| {
+            let nearest = SamplerDesc::nearest();
+            let bindings = [
+                Bind::uniform(0, view_params).part(part),
+                Bind::uniform(1, params),
+                Bind::storage_image(3, ids.triangles),
+                Bind::storage_image(4, ids.neighbours),
+                Bind::uniform(5, tiles.arguments),
+                Bind::sampled(6, tiles.tiles, nearest),
+                Bind::storage_image(7, shafts),
+                Bind::storage_image(8, pool),
+                Bind::storage_image(9, lists),
+                Bind::storage_buffer(10, used),
+                Bind::storage_image(11, edges),
+                Bind::storage_image(12, triangles),
+            ];
+            let pipeline = ComputePipelineDesc {
+                constants: vec![(0, shape)],
+                ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_ENTRIES_COMP)
+            };
+            ctx.bind_compute(&pipeline, &bindings, &[])?;
+            tiles.dispatch(ctx)
+        });
+        let candidates = Candidates {
+            lists,
+            used,
+            ..candidates
+        };
+        (candidates, [edges, triangles])
+    }
+
+    /// Declares the pass that settles tiles by their entries, and lists the others.
+    fn add_classes(
+        &self,
+        graph: &mut Graph<'_>,
+        inputs: &ShadowInputs<'_>,
+        candidates: Candidates,
+        [edges, triangles]: [ImageId; 2],
+        made: Made,
+    ) -> (Lists, Made) {
+        let name = &inputs.light_name;
+        let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
+        let Candidates {
+            tiles,
+            lists,
             further,
             mut partial,
             walk_rest,
             mut pieces,
             mut open,
             sorted: [plain, mut others],
+            ..
         } = candidates;
-        let edges = texels(vk::Format::R32_UINT, sizes.edge_rows * POOL_WIDTH);
-        let edges = graph.create_image(format!("{NAME}.edges {name}"), edges);
-        let triangles = texels(vk::Format::R32_UINT, sizes.pool_rows * POOL_WIDTH);
-        let triangles = graph.create_image(format!("{NAME}.triangles {name}"), triangles);
         let tasks = sizes.pool_rows * POOL_WIDTH / sizes.task_entries;
         let tasks = texels(vk::Format::R32G32B32A32_UINT, tasks);
         let tasks = graph.create_image(format!("{NAME}.tasks {name}"), tasks);
-        let ids = inputs.ids;
-        let view_depth = inputs.gbuffer.view_depth;
+        let (scene_triangles, view_depth) = (inputs.ids.triangles, inputs.gbuffer.view_depth);
         let (view_params, part) = inputs.view_params;
         let shape = shape_number(&inputs.light.shape);
-        let mut pass = graph.pass(format!("{NAME}.entries {name}"), PassKind::Compute);
+        let mut pass = graph.pass(format!("{NAME}.classes {name}"), PassKind::Compute);
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
-        let images = [ids.triangles, ids.neighbours, shafts, view_depth, pool];
-        for image in images {
+        for image in [scene_triangles, shafts, view_depth, edges] {
             pass.read(image, Access::StorageRead(Stage::Compute));
         }
         tiles.read(&mut pass);
@@ -366,10 +432,7 @@ impl Making {
             tiles: others.tiles,
         };
         let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
-        let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
         let further = pass.write(further, Access::StorageReadWrite(Stage::Compute));
-        let edges = pass.overwrite(edges, Access::StorageWrite(Stage::Compute));
-        let triangles = pass.overwrite(triangles, Access::StorageWrite(Stage::Compute));
         let tasks = pass.overwrite(tasks, Access::StorageWrite(Stage::Compute));
         let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
         let estimates = pass.write(made.estimates, Access::StorageWrite(Stage::Compute));
@@ -378,41 +441,38 @@ impl Making {
             let bindings = [
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
-                Bind::storage_image(2, open.tiles),
-                Bind::storage_image(3, ids.triangles),
-                Bind::storage_image(4, ids.neighbours),
-                Bind::uniform(5, tiles.arguments),
-                Bind::sampled(6, tiles.tiles, nearest),
-                Bind::storage_image(7, shafts),
-                Bind::storage_image(8, pool),
-                Bind::storage_image(9, lists),
-                Bind::storage_buffer(10, used),
-                Bind::storage_image(11, edges),
-                Bind::storage_image(12, triangles),
-                Bind::storage_image(13, visibility),
-                Bind::storage_image(14, view_depth),
-                Bind::storage_buffer(15, further),
-                Bind::storage_image(16, tasks),
-                Bind::storage_buffer(17, partial.arguments),
-                Bind::storage_image(18, partial.tiles),
-                Bind::storage_buffer(19, pieces.arguments),
-                Bind::storage_image(20, pieces.tiles),
-                Bind::storage_image(21, estimates),
-                Bind::storage_buffer(22, open.arguments),
-                Bind::storage_buffer(23, plain.arguments),
-                Bind::storage_buffer(24, others.arguments),
-                Bind::storage_image(25, others.tiles),
+                Bind::storage_image(2, scene_triangles),
+                Bind::uniform(3, tiles.arguments),
+                Bind::sampled(4, tiles.tiles, nearest),
+                Bind::storage_image(5, shafts),
+                Bind::storage_image(6, edges),
+                Bind::storage_image(7, lists),
+                Bind::storage_image(8, visibility),
+                Bind::storage_image(9, view_depth),
+                Bind::storage_image(10, estimates),
+                Bind::storage_buffer(11, further),
+                Bind::storage_image(12, tasks),
+                Bind::storage_buffer(13, partial.arguments),
+                Bind::storage_image(14, partial.tiles),
+                Bind::storage_buffer(15, open.arguments),
+                Bind::storage_image(16, open.tiles),
+                Bind::storage_buffer(17, pieces.arguments),
+                Bind::storage_image(18, pieces.tiles),
+                Bind::storage_buffer(19, plain.arguments),
+                Bind::storage_buffer(20, others.arguments),
+                Bind::storage_image(21, others.tiles),
             ];
             let pipeline = ComputePipelineDesc {
                 constants: vec![(0, shape), (4, sizes.task_entries)],
-                ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_ENTRIES_COMP)
+                ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_CLASSES_COMP)
             };
             ctx.bind_compute(&pipeline, &bindings, &[])?;
-            tiles.dispatch(ctx)
+            ctx.dispatch_indirect(tiles.arguments, OTHER_DISPATCH)
         });
         let lists = Lists {
             tiles: open,
-            sorted: Some([plain, others]),
+            // Where there are several blocks of samples all are in pieces.
+            sorted: (sizes.blocks == 1).then_some([plain, others]),
             lists,
             edges,
             triangles,

@@ -1,6 +1,6 @@
 //! The passes that work on the lists.
 
-use super::{Lists, Made, NAME, PARTS, Sizes, texels};
+use super::{Lists, Made, NAME, OTHER_DISPATCH, PARTS, Sizes, texels};
 use crate::geometry::{TILE_SIZE, TileList};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageId, PassKind, Stage};
@@ -26,9 +26,9 @@ struct Push {
 /// What the tiles are worked on for.
 #[derive(Clone, Copy, Debug)]
 enum Step {
-    /// The beginnings of their lists.
-    Tiles,
-    /// The same of plain tiles, and of the others.
+    /// Those that are made in pieces: each block of samples, of long lists their beginnings.
+    Pieces,
+    /// Plain ones of the others, and the rest of them.
     Plain(TileList),
     Others(TileList),
     /// Receivers among them whose numbers of triangles have no room in digits.
@@ -78,12 +78,11 @@ impl Masks {
         let cleared = [spilled, none];
         pass.record(move |ctx| cleared.iter().try_for_each(|list| list.record_clear(ctx)));
         let mut made = (made, words);
-        let begins = match self.lists.sorted {
-            Some([plain, others]) => vec![Step::Others(others), Step::Plain(plain)],
-            None => vec![Step::Tiles],
-        };
+        let whole = self.lists.sorted;
+        let whole = whole.map(|[plain, others]| [Step::Others(others), Step::Plain(plain)]);
         let rest = [Step::Spilled, Step::Further];
-        for step in begins.into_iter().chain(rest) {
+        let steps = [Step::Pieces].into_iter();
+        for step in steps.chain(whole.into_iter().flatten()).chain(rest) {
             made = self.add_pass(graph, inputs, made, [&mut spilled, &mut none], step);
         }
         made.1 = self.add_walks(graph, inputs, made.1);
@@ -103,20 +102,20 @@ impl Masks {
         let (view_params, part) = inputs.view_params;
         let (params, shafts) = (self.params, self.shafts);
         let Lists {
-            tiles,
             lists,
             edges,
             triangles,
             further,
             tasks,
+            pieces,
             ..
         } = self.lists;
         let (arguments, list, what) = match step {
-            Step::Tiles => (tiles.arguments, tiles.tiles, "masks"),
+            Step::Pieces => (pieces.arguments, pieces.tiles, "masks_pieces"),
             Step::Plain(plain) => (plain.arguments, plain.tiles, "masks_plain"),
             Step::Others(others) => (others.arguments, others.tiles, "masks"),
-            Step::Spilled => (spilled.arguments, tiles.tiles, "masks_spilled"),
-            Step::Further => (further, tiles.tiles, "further"),
+            Step::Spilled => (spilled.arguments, pieces.tiles, "masks_spilled"),
+            Step::Further => (further, pieces.tiles, "further"),
         };
         let label = &self.label;
         let mut pass = graph.pass(format!("{NAME}.{what}{label} {name}"), PassKind::Compute);
@@ -146,16 +145,17 @@ impl Masks {
         let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
         let estimates = pass.write(made.estimates, Access::StorageReadWrite(Stage::Compute));
         let words = match step {
-            Step::Tiles | Step::Others(_) => {
-                pass.overwrite(words, Access::StorageWrite(Stage::Compute))
-            }
-            Step::Plain(_) | Step::Spilled => {
+            Step::Pieces => pass.overwrite(words, Access::StorageWrite(Stage::Compute)),
+            Step::Plain(_) | Step::Others(_) | Step::Spilled => {
                 pass.write(words, Access::StorageWrite(Stage::Compute))
             }
             Step::Further => pass.write(words, Access::StorageReadWrite(Stage::Compute)),
         };
-        let spills = if matches!(step, Step::Tiles | Step::Others(_)) {
+        let spills = if matches!(step, Step::Pieces) {
             spilled.fill(&mut pass);
+            *spilled
+        } else if matches!(step, Step::Plain(_) | Step::Others(_)) {
+            spilled.extend(&mut pass);
             *spilled
         } else {
             // The shader may write to it, for all that is known of it.
@@ -177,7 +177,12 @@ impl Masks {
             (4, self.sizes.task_entries),
             (5, u32::from(matches!(step, Step::Others(_)))),
             (6, u32::from(matches!(step, Step::Spilled))),
+            (7, u32::from(!matches!(step, Step::Plain(_) | Step::Others(_)))),
         ];
+        let dispatched = match step {
+            Step::Pieces => OTHER_DISPATCH,
+            _ => 0,
+        };
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
             let bindings = [
@@ -208,7 +213,7 @@ impl Masks {
                 ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_MASKS_COMP)
             };
             ctx.bind_compute(&pipeline, &bindings, bytemuck::bytes_of(&push))?;
-            ctx.dispatch_indirect(arguments, 0)
+            ctx.dispatch_indirect(arguments, dispatched)
         });
         let made = Made {
             visibility,

@@ -19,8 +19,10 @@
 //! | `no_rest`, `settle` | lit and dark tiles settled, as far as a short walk tells |
 //! | `lists` | more lit tiles settled; candidates of the others |
 //! | `overflow`, `lists.again` | the same with equal room for all, where they had too little |
-//! | `entries` | more lit tiles and dark ones settled; edges and triangles of the others |
-//! | `masks_plain`, `masks` | visibility of the others, or what the beginnings of long lists hide |
+//! | `entries` | edges and triangles for the masks |
+//! | `classes` | more lit tiles and dark ones settled; the others listed by kind |
+//! | `masks_pieces` | what the beginnings of long lists hide, or each block of more than 64 samples |
+//! | `masks`, `masks_plain` | visibility of the others |
 //! | `further` | what the rest of long lists hides |
 //! | `walk` | what triangles hide that lists had no room for, each pixel by itself |
 //! | `walk_rest` | the rest of long walks |
@@ -47,7 +49,7 @@ use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, shape_number};
 use crate::geometry::{TILE_SIZE, TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage};
+use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
@@ -64,7 +66,7 @@ const BLOCK: u32 = 8;
 const SHAFT_TEXELS: u32 = 17;
 
 /// `LIST_TEXELS` in `shaft_masks/lists.glsl`.
-const LIST_TEXELS: u32 = 3;
+const LIST_TEXELS: u32 = 6;
 
 /// Triangles of a chunk of a list: `CHUNK` in `shaft_masks/lists.glsl`.
 const CHUNK: u32 = 32;
@@ -99,8 +101,8 @@ const PARTS: u32 = 2;
 struct Lists {
     /// The tiles.
     tiles: TileList,
-    /// The same as two lists in one image: plain ones (`PLAIN` in `shaft_masks/masks.glsl`) from its begin on, others
-    /// from its end. `None` where they are not told apart.
+    /// Those that are not in `pieces`, as two lists in one image: plain ones (`PLAIN` in `shaft_masks/masks.glsl`) from
+    /// its begin on, others from its end. `None` where all are in pieces.
     sorted: Option<[TileList; 2]>,
     /// RGBA32_UINT, [`LIST_TEXELS`] texels a tile: `Entries` in `shaft_masks/lists.glsl`.
     lists: ImageId,
@@ -115,7 +117,8 @@ struct Lists {
     /// Tiles whose lists do not know all triangles.
     partial: TileList,
     walk_rest: walk::WalkRest,
-    /// Tiles whose masks are made in pieces: of long lists, or of several blocks of samples.
+    /// Tiles whose masks are made in pieces: of long lists, or of several blocks of samples. The other dispatch is one
+    /// over the blocks of each.
     pieces: TileList,
 }
 
@@ -273,6 +276,18 @@ fn part_list(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, what: &str) -> Ti
     let size = [across * TILE_SIZE, down * TILE_SIZE * PARTS];
     TileList::create(graph, &format!("{NAME}.{what} {}", inputs.light_name), size)
 }
+
+/// The same with arguments of another dispatch over it, at [`OTHER_DISPATCH`].
+fn part_list_for_two(graph: &mut Graph<'_>, inputs: &ShadowInputs<'_>, what: &str) -> TileList {
+    let name = format!("{NAME}.{what}.arguments {}", inputs.light_name);
+    TileList {
+        arguments: graph.create_buffer(name, BufferDesc { size: 32 }),
+        ..part_list(graph, inputs, what)
+    }
+}
+
+/// Offset of the arguments of another dispatch over a list.
+const OTHER_DISPATCH: u64 = 16;
 
 /// Declares the pass that finds the shaft of each listed tile. `params`: a uniform buffer of the size
 /// of [`ShaftParams`] that begins with the width and height of the picture.

@@ -9,8 +9,8 @@
 use super::bound::no_bound;
 use super::masks::{Masks, words_of_tile};
 use super::walk::{WalkRest, runs_in_dispatch};
-use super::{BLOCK, Lists, Made, NAME, PARTS, POOL_WIDTH, ShaftOptions, Sizes};
-use super::{add_params, part_list, texels};
+use super::{BLOCK, Lists, Made, NAME, OTHER_DISPATCH, PARTS, POOL_WIDTH, ShaftOptions, Sizes};
+use super::{add_params, part_list, part_list_for_two, texels};
 use crate::geometry::tile_counts;
 use crate::gpu::{ComputePipelineDesc, spirv};
 use crate::graph::{
@@ -304,7 +304,7 @@ impl Choice<'_> {
         let (name, label) = (&inputs.light_name, masks.label.clone());
         let [_, down] = tile_counts(inputs.camera.size());
         let sizes = masks.sizes;
-        let mut selected = part_list(graph, inputs, &format!("selected{label}"));
+        let mut selected = part_list_for_two(graph, inputs, &format!("selected{label}"));
         let mut partial = part_list(graph, inputs, &format!("partial{label}"));
         let mut walk_rest = WalkRest::create(graph, inputs, &label);
         let sixteen = BufferDesc { size: 16 };
@@ -315,15 +315,17 @@ impl Choice<'_> {
         let further = pass.overwrite(further, Access::Clear);
         walk_rest.arguments = pass.overwrite(walk_rest.arguments, Access::Clear);
         let runs = runs_in_dispatch(masks.nodes, &sizes);
+        let of_blocks = [0u32, 1, sizes.blocks, 0];
         let arguments = [
-            (selected.arguments, [0u32, 1, sizes.blocks, 0]),
-            (further, [0, 1, sizes.blocks, 0]),
-            (partial.arguments, [0, 1, sizes.blocks, 0]),
-            (walk_rest.arguments, [0, 1, runs * sizes.blocks, 0]),
+            (selected.arguments, 0, [0, 1, 1, 0]),
+            (selected.arguments, OTHER_DISPATCH, of_blocks),
+            (further, 0, of_blocks),
+            (partial.arguments, 0, of_blocks),
+            (walk_rest.arguments, 0, [0, 1, runs * sizes.blocks, 0]),
         ];
         pass.record(move |ctx| {
-            for (buffer, values) in arguments {
-                ctx.update_buffer(buffer, 0, bytemuck::cast_slice(&values))?;
+            for (buffer, offset, values) in arguments {
+                ctx.update_buffer(buffer, offset, bytemuck::cast_slice(&values))?;
             }
             Ok(())
         });

@@ -41,18 +41,17 @@ layout(set = 0, binding = 12, r32ui) uniform writeonly uimage2D triangle_pool;
 
 const uint NO_NEIGHBOUR = 0xffffffffu;
 
-shared uint edge_count;
 shared uint meeting_edges; // that meet the shaft
 shared uint count_sum;
-shared uint whole_count;
-shared uint other_count;
 shared uint first_triangle;
-// Counted triangles of a chunk, times two, plus one for those seen from behind. Chunks take turns, so that a lane
-// may begin the next one while others are at this one.
-shared uint counted[2u][CHUNK];
-shared uint counted_count[3u];
+// Of a chunk, in bits 0 to 7 its edges, from 8 on its whole triangles, from 16 on others, from 24 on covers: one atomic
+// addition gives each its place. Chunks take turns, so that a lane may begin the next one while others are at this one.
+shared uint found[3u];
 shared uint covers[MOST_COVERS];
-shared uint cover_count;
+
+const uint ONE_WHOLE = 0x100u;
+const uint ONE_OTHER = 0x10000u;
+const uint ONE_COVER = 0x1000000u;
 
 vec4 fetch_triangle_texel(uint texel) {
     return imageLoad(triangles, triangle_texel_place(texel));
@@ -87,45 +86,34 @@ bool rows_have_one_axis(Light light, Surfaces surfaces) {
     return abs(along - NEAR_AXIS) > surfaces.tilt + 1.0e-5;
 }
 
-// Where the edges of a tile go, and what an invocation knows of those that it added: kept to itself until all are,
-// because what is shared is dear.
-struct Added {
-    uint first;
-    uint room;
-    uint count_sum;
-    bool meets; // any meets the shaft
+// An edge of a counted triangle.
+struct Edge {
+    uint code;
+    bool is_kept;
+    bool meets; // the shaft
 };
 
-// Adds an edge: one that is beyond the samples on the side that edges count towards, or beyond the ends of
-// all rows, seen from every surface, is left out.
+// An edge that is beyond the samples on the side that edges count towards, or beyond the ends of all rows, seen from
+// every surface, is left out.
 // one_axis: rows lie along the same axis of a sphere for all surfaces.
-void add_edge(inout Added added, Shaft shaft, bool one_axis, vec3 a, vec3 b, uint code) {
-    bool beyond = false;
-    bool outside = false;
+bool edge_is_beyond(Shaft shaft, bool one_axis, vec3 a, vec3 b, out bool meets) {
+    float beyond = -1.0;
+    float outside = -1.0;
     // The rows of a sphere's disk turn a little from pixel to pixel, and by a right angle where they lie along another
     // axis; those of a rectangle rise: what is below it may cross them before their first sample.
     uint last = LIGHT_SHAPE == LIGHT_SPHERE ? (one_axis ? 1u : 0u) : LIGHT_SHAPE == LIGHT_RECT ? 3u : 4u;
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         vec4 plane = shaft.planes[i];
-        bool both = dot(plane.xyz, a) > plane.w && dot(plane.xyz, b) > plane.w;
-        outside = outside || both;
-        beyond = beyond || (both && i != 1u && i < last);
+        float both = lesser(dot(plane.xyz, a) - plane.w, dot(plane.xyz, b) - plane.w);
+        outside = both > outside ? both : outside;
+        beyond = both > beyond && i != 1u && i < last ? both : beyond;
     }
-    if (!beyond) {
-        uint at = atomicAdd(edge_count, 1u);
-        added.count_sum += (code & EDGE_DOUBLE) != 0u ? 2u : 1u;
-        added.meets = added.meets || !outside;
-        if (at < added.room) {
-            imageStore(edge_pool, triangle_texel_place(added.first + at), uvec4(code));
-        }
-    }
+    meets = outside <= 0.0;
+    return beyond > 0.0;
 }
 
-// The edge of a counted triangle that begins at a corner.
-void add_edge_of(inout Added added, Shaft shaft, Surfaces surfaces, bool one_axis, uint triangle, uint corner, uint side) {
-    uint beside = imageLoad(neighbours, triangle_texel_place(triangle))[corner];
-    vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
-    vec3 b = fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
+// The edge of a counted triangle that begins at a corner. beside: its neighbour there.
+Edge edge_of(Shaft shaft, Surfaces surfaces, bool one_axis, uint triangle, uint corner, uint beside, vec3 a, vec3 b, uint side) {
     bool alone = beside == NO_NEIGHBOUR;
     uint other = alone ? triangle : beside >> 1;
     Triangle neighbour = fetch_triangle(other);
@@ -135,11 +123,11 @@ void add_edge_of(inout Added added, Shaft shaft, Surfaces surfaces, bool one_axi
     bool goes_on = both && (other_side == side) == alike;
     // Both sides of a fold count the same way: the first of the two adds it.
     bool fold = both && !goes_on;
-    if (!goes_on && !(fold && other < triangle)) {
-        uint code = triangle << EDGE_CORNER_BITS | corner | (fold ? EDGE_DOUBLE : 0u);
-        code |= side == SIDE_BACK ? EDGE_TURNED : 0u;
-        add_edge(added, shaft, one_axis, a, b, code);
-    }
+    Edge edge;
+    edge.code = triangle << EDGE_CORNER_BITS | corner | (fold ? EDGE_DOUBLE : 0u) | (side == SIDE_BACK ? EDGE_TURNED : 0u);
+    bool beyond = edge_is_beyond(shaft, one_axis, a, b, edge.meets);
+    edge.is_kept = !goes_on && !(fold && other < triangle) && !beyond;
+    return edge;
 }
 
 void main() {
@@ -155,13 +143,9 @@ void main() {
     // Only this workgroup writes them, and no texel that another invocation reads.
     uvec4 candidates = imageLoad(lists, list_place(part));
     if (lane == 0u) {
-        edge_count = 0u;
         meeting_edges = 0u;
         count_sum = 0u;
-        whole_count = 0u;
-        other_count = 0u;
-        counted_count[0] = 0u;
-        cover_count = 0u;
+        found[0] = 0u;
         first_triangle = atomicAdd(triangles_used, candidates.y);
     }
     barrier();
@@ -171,13 +155,16 @@ void main() {
     vec3 some = fetch_some_surface(part);
     mat3 frame = light_frame(view.light, some);
     bool one_axis = rows_have_one_axis(view.light, surfaces);
-    uint last = first_triangle + candidates.y - 1u;
+    uint first = first_triangle;
+    uint last = first + candidates.y - 1u;
     uint chunk = candidates.x;
     uint turn = 0u;
     uint begin = 0u;
     // All tiles have the same room, so that it is not by their order which of them have some.
     uint room = params.pattern.z / arguments.count;
-    Added added = Added(index * room, room, 0u, false);
+    uvec4 counts = uvec4(0u); // edges, whole triangles, others, and covers of the chunks before
+    uint own_sum = 0u;
+    bool any_meets = false;
     // Loops look at their end whether they go on: a driver without branches does one more turn of others, for nothing.
     do {
         uint end = min(CHUNK, candidates.y - begin);
@@ -186,57 +173,70 @@ void main() {
             bool is_listed = i < end;
             uint triangle = is_listed ? imageLoad(pool, chunk_place(chunk, i))[i % 4u] : 0u;
             Triangle t = fetch_triangle(triangle);
-            if (is_listed && meets(shaft, t)) {
-                bool between = is_whole(surfaces, t);
-                uint side = triangle_side(surfaces, t.corners[0], t.plane.xyz);
-                uint side_of_light = light_side(surfaces, view.light, frame, t.corners[0], t.plane.xyz);
-                bool hides = !hides_nothing(surfaces, side, side_of_light,
-                    t.corners[0], t.corners[1], t.corners[2]);
-                bool is_counted = between && side != SIDE_UNSURE;
-                if (is_counted) {
-                    uint at = atomicAdd(counted_count[turn % 3u], 1u);
-                    counted[turn % 2u][at] = triangle << 1 | (side == SIDE_BACK ? 1u : 0u);
-                } else if (hides) {
-                    uint at = between ? first_triangle + atomicAdd(whole_count, 1u) : last - atomicAdd(other_count, 1u);
-                    imageStore(triangle_pool, triangle_texel_place(at), uvec4(triangle));
-                }
-                float margin_m = cover_margin_m(surfaces, view.light, t);
-                if (!material_is_masked(t.plane.w) && sees_through(some, view.light, frame, vec3(0.0), t, margin_m)) {
-                    uint cover = atomicAdd(cover_count, 1u);
-                    if (cover < MOST_COVERS) {
-                        covers[cover] = triangle;
+            is_listed = is_listed && meets(shaft, t);
+            bool between = is_whole(surfaces, t);
+            uint side = triangle_side(surfaces, t.corners[0], t.plane.xyz);
+            uint side_of_light = light_side(surfaces, view.light, frame, t.corners[0], t.plane.xyz);
+            bool is_counted = between && side != SIDE_UNSURE;
+            bool is_drawn = is_listed && !is_counted
+                && !hides_nothing(surfaces, side, side_of_light, t.corners[0], t.corners[1], t.corners[2]);
+            is_counted = is_listed && is_counted;
+            float margin_m = cover_margin_m(surfaces, view.light, t);
+            bool covers_some = is_listed && !material_is_masked(t.plane.w)
+                && sees_through(some, view.light, frame, vec3(0.0), t, margin_m);
+            uvec3 beside = imageLoad(neighbours, triangle_texel_place(triangle)).xyz;
+            Edge edges[3];
+            uint own = is_drawn ? (between ? ONE_WHOLE : ONE_OTHER) : 0u;
+            own += covers_some ? ONE_COVER : 0u;
+            for (uint corner = 0u; corner < 3u; ++corner) {
+                edges[corner] = edge_of(shaft, surfaces, one_axis, triangle, corner, beside[corner],
+                    t.corners[corner], t.corners[(corner + 1u) % 3u], side);
+                edges[corner].is_kept = edges[corner].is_kept && is_counted;
+                own += edges[corner].is_kept ? 1u : 0u;
+            }
+            if (own != 0u) {
+                uint before = atomicAdd(found[turn % 3u], own);
+                uint at = counts.x + (before & 0xffu);
+                for (uint corner = 0u; corner < 3u; ++corner) {
+                    bool is_kept = edges[corner].is_kept;
+                    if (is_kept && at < room) {
+                        imageStore(edge_pool, triangle_texel_place(index * room + at), uvec4(edges[corner].code));
                     }
+                    at += is_kept ? 1u : 0u;
+                    own_sum += is_kept ? ((edges[corner].code & EDGE_DOUBLE) != 0u ? 2u : 1u) : 0u;
+                    any_meets = any_meets || (is_kept && edges[corner].meets);
+                }
+                uint whole = first + counts.y + (before >> 8 & 0xffu);
+                uint other = last - counts.z - (before >> 16 & 0xffu);
+                if (is_drawn) {
+                    imageStore(triangle_pool, triangle_texel_place(between ? whole : other), uvec4(triangle));
+                }
+                uint cover = counts.w + (before >> 24);
+                if (covers_some && cover < MOST_COVERS) {
+                    covers[cover] = triangle;
                 }
             }
             i += gl_WorkGroupSize.x;
         } while (i < end);
         if (lane == 0u) {
-            counted_count[(turn + 1u) % 3u] = 0u;
+            found[(turn + 1u) % 3u] = 0u;
         }
         barrier();
-        uint corners = 3u * counted_count[turn % 3u];
-        i = lane;
-        do {
-            uint code = counted[turn % 2u][min(i / 3u, CHUNK - 1u)];
-            if (i < corners) {
-                add_edge_of(added, shaft, surfaces, one_axis, code >> 1, i % 3u, (code & 1u) != 0u ? SIDE_BACK : SIDE_FRONT);
-            }
-            i += gl_WorkGroupSize.x;
-        } while (i < corners);
+        counts += uvec4(found[turn % 3u]) >> uvec4(0u, 8u, 16u, 24u) & 0xffu;
         chunk = imageLoad(pool, chunk_place(chunk, CHUNK)).x;
         turn += 1u;
         begin += CHUNK;
     } while (begin < candidates.y);
-    atomicAdd(count_sum, added.count_sum);
-    if (added.meets) {
+    atomicAdd(count_sum, own_sum);
+    if (any_meets) {
         meeting_edges = 1u;
     }
     barrier();
 
     // A texel an invocation, from the second on: those after them stay empty.
-    uvec4 texel = uvec4(added.first, edge_count, first_triangle, candidates.y);
-    texel = lane == 1u ? uvec4(whole_count, other_count, 0u, 0u) : texel;
-    texel = lane == 2u ? uvec4(count_sum, meeting_edges, cover_count, 0u) : texel;
+    uvec4 texel = uvec4(index * room, counts.x, first, candidates.y);
+    texel = lane == 1u ? uvec4(counts.yz, 0u, 0u) : texel;
+    texel = lane == 2u ? uvec4(count_sum, meeting_edges, counts.w, 0u) : texel;
     uint cover = lane == 4u ? 4u : 0u;
     uvec4 covering = uvec4(covers[cover], covers[cover + 1u], covers[cover + 2u], covers[cover + 3u]);
     texel = lane > 2u ? covering : texel;

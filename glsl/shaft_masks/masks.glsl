@@ -154,7 +154,7 @@ struct Side {
 
 Side side_between(vec2 a, vec2 b) {
     precise float slope = (b.x - a.x) / (b.y - a.y);
-    return Side(a.y < b.y ? a : b, max(a.y, b.y), slope);
+    return Side(a.y < b.y ? a : b, a.y < b.y ? b.y : a.y, slope);
 }
 
 // Four times the number of a row's samples before the edge; of no meaning in rows that it does not cross.
@@ -167,8 +167,12 @@ uint columns_before_side(uint r, Side side) {
     return quads_before_side(r, side) >> 2;
 }
 
-bool crosses(vec4 row, Side side) {
-    return side.low.y <= row.x && row.x < side.high;
+// All bits where a side crosses a row, none where not. From the signs of differences, which are exact: a driver may
+// take much longer over what two comparisons have in common.
+int crossing(vec4 row, Side side) {
+    precise float from_low = row.x - side.low.y;
+    precise float from_high = row.x - side.high;
+    return (~floatBitsToInt(from_low) & floatBitsToInt(from_high)) >> 31;
 }
 
 // Numbers of triangles before samples: a word of eight digits for each row. Below nothing there is some room for
@@ -197,13 +201,14 @@ void count_edge(Projection projection, vec3 from, vec3 to, uint code, inout uint
     int weight = (code & EDGE_DOUBLE) != 0u ? 2 : 1;
     weight = edge.ends ? -weight : weight;
     uint step = ONE_DIGIT * uint(weight);
-    uint quads = 0u;
+    int quads = 0;
     for (uint r = 0u; r < ROWS; ++r) {
-        uint before = crosses(light_rows[r], edge.side) ? quads_before_side(r, edge.side) : 32u;
-        digits[r] += before < 32u ? step << before : 0u;
-        quads += before;
+        uint before = quads_before_side(r, edge.side);
+        int rest = crossing(light_rows[r], edge.side) & (int(before) - 32);
+        digits[r] += step << (before & 31u) & uint(rest >> 31);
+        quads += rest;
     }
-    sum += weight * int(32u * ROWS - quads);
+    sum -= weight * quads;
 }
 
 // The samples with another number than none; 0 with fits false where digits spilled.
@@ -235,7 +240,7 @@ void count_edge_in_halves(Projection projection, vec3 from, vec3 to, uint code, 
     step = edge.ends ? 0u - step : step;
     for (uint r = 0u; r < ROWS; ++r) {
         uint before = columns_before_side(r, edge.side);
-        uint crossed = crosses(light_rows[r], edge.side) ? step : 0u;
+        uint crossed = step & uint(crossing(light_rows[r], edge.side));
         for (uint i = 0u; i < HALVES; ++i) {
             halves[HALVES * r + i] += before <= 2u * i ? crossed : before == 2u * i + 1u ? crossed << 16 : 0u;
         }
@@ -274,7 +279,7 @@ void add_whole(Projection projection, vec3 corner_a, vec3 corner_b, vec3 corner_
         bool below = row.x < middle.y;
         Side other = Side(below ? lower.low : upper.low, 0.0, below ? lower.slope : upper.slope);
         uint within = 0xffu << columns_before_side(r, whole) ^ 0xffu << columns_before_side(r, other);
-        blocked[r / 4u] |= crosses(row, whole) ? (within & 0xffu) << (8u * (r % 4u)) : 0u;
+        blocked[r / 4u] |= (within & 0xffu & uint(crossing(row, whole))) << (8u * (r % 4u));
     }
 }
 
@@ -350,16 +355,21 @@ uvec2 mask_of_lines(vec3 lines[LINES], bool last_counts) {
     for (uint i = 0u; i < LINES; ++i) {
         crossings[i] = crossing_of_line(lines[i]);
     }
-    bool from[LINES] = bool[](!crossings[0].before, !crossings[1].before, !crossings[2].before, !crossings[3].before && last_counts);
-    bool to[LINES] = bool[](crossings[0].before, crossings[1].before, crossings[2].before, crossings[3].before && last_counts);
+    // Slope and place of where a row's samples within a line begin and end: level and far out where they do not.
+    vec4 ends[LINES];
+    for (uint i = 0u; i < LINES; ++i) {
+        bool counts = i < LINES - 1u || last_counts;
+        vec2 line = vec2(crossings[i].slope, crossings[i].at);
+        ends[i].xy = counts && !crossings[i].before ? line : vec2(0.0, -FAR_ALONG);
+        ends[i].zw = counts && crossings[i].before ? line : vec2(0.0, FAR_ALONG);
+    }
     uvec2 within = uvec2(0u);
     for (uint r = 0u; r < ROWS; ++r) {
         float first = -FAR_ALONG;
         float end = FAR_ALONG;
         for (uint i = 0u; i < LINES; ++i) {
-            precise float place = crossings[i].slope * light_rows[r].x + crossings[i].at;
-            float low = from[i] ? place : -FAR_ALONG;
-            float high = to[i] ? place : FAR_ALONG;
+            precise float low = ends[i].x * light_rows[r].x + ends[i].y;
+            precise float high = ends[i].z * light_rows[r].x + ends[i].w;
             first = low > first ? low : first;
             end = high < end ? high : end;
         }

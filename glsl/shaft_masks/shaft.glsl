@@ -81,37 +81,53 @@ const uint BOX_INSIDE = 2u;
 // outside by shaft_meets_triangle, and every one of a box that is inside meets the shaft by it.
 const float BOX_ROUNDING = 1.0e-6;
 
-uint shaft_side_of_box(Shaft shaft, vec3 low, vec3 high) {
+// The lesser of two numbers: as the comparison that it is. min looks out for what is no number, at three times the cost.
+float lesser(float a, float b) {
+    return a < b ? a : b;
+}
+
+float least_of(vec3 v) {
+    return lesser(v.x, lesser(v.y, v.z));
+}
+
+// What has to be 0 or more of a box that meets the shaft, and of one inside it. Numbers are kept rather than what
+// comparisons say of them: the sign of a difference is exact, and a driver may take much longer over two comparisons.
+vec2 shaft_room_of_box(Shaft shaft, vec3 low, vec3 high) {
     vec3 middle = 0.5 * low + 0.5 * high;
     vec3 half_size = 0.5 * high - 0.5 * low;
-    bool meets = all(lessThanEqual(low, shaft.high.xyz)) && all(greaterThanEqual(high, shaft.low.xyz));
-    bool inside = all(greaterThanEqual(low, shaft.low.xyz)) && all(lessThanEqual(high, shaft.high.xyz));
+    float meets = lesser(least_of(shaft.high.xyz - low), least_of(high - shaft.low.xyz));
+    float inside = lesser(least_of(low - shaft.low.xyz), least_of(shaft.high.xyz - high));
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         vec4 plane = shaft.planes[i];
         vec3 size = abs(plane.xyz);
         float height = dot(plane.xyz, middle) - plane.w;
         float extent = dot(size, half_size);
         float slack = BOX_ROUNDING * (dot(size, abs(middle)) + extent + abs(plane.w));
-        meets = meets && height - extent <= slack;
-        inside = inside && height + extent <= -slack;
+        meets = lesser(slack - (height - extent), meets);
+        inside = lesser(-slack - (height + extent), inside);
     }
-    return !meets ? BOX_OUTSIDE : inside ? BOX_INSIDE : BOX_MEETS;
+    return vec2(meets, inside);
+}
+
+uint shaft_side_of_box(Shaft shaft, vec3 low, vec3 high) {
+    vec2 room = shaft_room_of_box(shaft, low, high);
+    return room.x < 0.0 ? BOX_OUTSIDE : room.y < 0.0 ? BOX_MEETS : BOX_INSIDE;
 }
 
 bool shaft_meets_box(Shaft shaft, vec3 low, vec3 high) {
-    return shaft_side_of_box(shaft, low, high) != BOX_OUTSIDE;
+    return shaft_room_of_box(shaft, low, high).x >= 0.0;
 }
 
 bool shaft_meets_triangle(Shaft shaft, vec3 a, vec3 b, vec3 c) {
     vec3 low = min(a, min(b, c));
     vec3 high = max(a, max(b, c));
-    bool meets = all(lessThanEqual(low, shaft.high.xyz)) && all(greaterThanEqual(high, shaft.low.xyz));
+    float meets = lesser(least_of(shaft.high.xyz - low), least_of(high - shaft.low.xyz));
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {
         vec4 plane = shaft.planes[i];
-        float least = min(dot(plane.xyz, a), min(dot(plane.xyz, b), dot(plane.xyz, c)));
-        meets = meets && least <= plane.w;
+        float least = least_of(vec3(dot(plane.xyz, a), dot(plane.xyz, b), dot(plane.xyz, c)));
+        meets = lesser(plane.w - least, meets);
     }
-    return meets;
+    return meets >= 0.0;
 }
 
 // Rows of a sphere's samples lie along its first axis as long as that is not nearer to the line of sight: as a cosine.

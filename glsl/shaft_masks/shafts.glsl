@@ -116,8 +116,9 @@ float depth_rounding_m(uvec2 pixel, float farthest) {
     return part < away ? far_m * part / away : far_m;
 }
 
-// Surfaces of shaft_masks/sides.glsl. low, high: of the box in its frame, from its base. some: one of them.
-void store_surfaces(ivec2 place, Light light, vec3 base, vec3 some, mat3 frame, vec3 low, vec3 high, float slack,
+// Surfaces of shaft_masks/sides.glsl. low, high: of the box in its frame, from its base. some: one of them. Returns how
+// far from a sphere's centre towards them what is nearer to it hides nothing, and how far directions to them differ.
+vec2 store_surfaces(ivec2 place, Light light, vec3 base, vec3 some, mat3 frame, vec3 low, vec3 high, float slack,
     vec2 depths) {
     vec3 center = base + frame * (0.5 * low + 0.5 * high);
     vec3 half_size = 0.5 * high - 0.5 * low;
@@ -154,6 +155,7 @@ void store_surfaces(ivec2 place, Light light, vec3 base, vec3 some, mat3 frame, 
     imageStore(shafts, place + ivec2(3, 0), vec4(frame[2] * half_size.z, some.x));
     imageStore(shafts, place + ivec2(4, 0), vec4(z, tilt));
     imageStore(shafts, place + ivec2(5, 0), vec4(least, most, radius, end));
+    return vec2(end, tilt);
 }
 
 // Whether a tile shows one triangle, or nothing, and the points at its corners lie within the triangle: then so do all,
@@ -243,6 +245,12 @@ void store_shaft(Light light, uvec2 tile, uvec2 tiles, TileBounds bounds, vec2 d
     low -= slack + between_m;
     high += slack + between_m;
 
+    uvec2 part = uvec2(tile.x, tile.y + (behind ? tiles.y : 0u));
+    ivec2 place = ivec2(part.x * SHAFT_TEXELS, part.y);
+    vec3 own_slack = vec3(vec2(slack + between_m), slack); // depths are off along the rays, not across the surface
+    vec2 sphere = store_surfaces(place + ivec2(SHAFT_PLANES + 2u, 0), light, base, some, box_frame,
+        own_low - own_slack, own_high + own_slack, slack, depths);
+
     vec4 planes[SHAFT_PLANES];
     vec3 right = hull_side(half_size.xz, high.x, low.z, high.z);
     vec3 left = hull_side(half_size.xz, -low.x, low.z, high.z);
@@ -252,7 +260,13 @@ void store_shaft(Light light, uvec2 tile, uvec2 tiles, TileBounds bounds, vec2 d
     planes[1] = vec4(left.y * frame[2] - left.x * frame[0], left.z);
     planes[2] = vec4(up.x * frame[1] + up.y * frame[2], up.z);
     planes[3] = vec4(down.y * frame[2] - down.x * frame[1], down.z);
-    planes[4] = vec4(-frame[2], -(LIGHT_SHAPE == LIGHT_SUN ? low.z : min(low.z, -half_size.z)));
+    float near_z = LIGHT_SHAPE == LIGHT_SUN ? low.z : min(low.z, -half_size.z);
+    if (LIGHT_SHAPE == LIGHT_SPHERE) {
+        // Of the hull at most as far from the centre as this is what is nearer to it than its samples.
+        float aside = max(half_size.x, max(max(-low.x, high.x), max(-low.y, high.y)));
+        near_z = max(near_z, min(low.z, sphere.x - 4.0 * sphere.y * aside));
+    }
+    planes[4] = vec4(-frame[2], -near_z);
     planes[5] = vec4(frame[2], max(high.z, half_size.z));
     if (LIGHT_SHAPE == LIGHT_SUN) {
         planes[5] = vec4(vec3(0.0), FAR);
@@ -287,11 +301,6 @@ void store_shaft(Light light, uvec2 tile, uvec2 tiles, TileBounds bounds, vec2 d
         box_low = min(box_low - between_m, light.center.xyz - light_reach);
         box_high = max(box_high + between_m, light.center.xyz + light_reach);
     }
-    vec3 own_slack = vec3(vec2(slack + between_m), slack); // depths are off along the rays, not across the surface
-    uvec2 part = uvec2(tile.x, tile.y + (behind ? tiles.y : 0u));
-    ivec2 place = ivec2(part.x * SHAFT_TEXELS, part.y);
-    store_surfaces(place + ivec2(SHAFT_PLANES + 2u, 0), light, base, some, box_frame, own_low - own_slack,
-        own_high + own_slack, slack, depths);
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 8u, 0), vec4(normal_low, some.y));
     imageStore(shafts, place + ivec2(SHAFT_PLANES + 9u, 0), vec4(normal_high, some.z));
     for (uint i = 0u; i < SHAFT_PLANES; ++i) {

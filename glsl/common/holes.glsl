@@ -15,7 +15,8 @@ vec4 fetch_footprint(ivec2 place);
 struct Holes {
     uint start;  // first footprint
     vec2 size;   // of the texture, texels
-    vec2 cells;  // footprints across and down
+    vec2 cells;  // footprints across and down,
+    vec2 turns;  // and one part of so many
     vec2 least;  // numbers of footprints are first made to lie between these,
     vec2 most;
     vec2 first;  // and counted from here
@@ -35,6 +36,7 @@ Holes fetch_holes(uint material) {
     holes.size = texture_place.yz;
     // Before a clamped border there is one more; mirrored, a texture only repeats after two.
     holes.cells = holes.size * mix(vec2(1.0), vec2(2.0), mirrored) + vec2(clamped);
+    holes.turns = 1.0 / holes.cells;
     holes.first = -vec2(clamped);
     holes.least = mix(vec2(-3.0e38), vec2(-1.0), clamped);
     holes.most = mix(vec2(3.0e38), holes.size - 1.0, clamped);
@@ -49,7 +51,9 @@ bool is_hole_at(Holes holes, vec2 uv) {
     vec2 corner = floor(place);
     vec2 part = clamp(place - corner, 0.0, 1.0);
     vec2 cell = clamp(corner, holes.least, holes.most) - holes.first;
-    cell = clamp(cell - holes.cells * floor(cell / holes.cells), vec2(0.0), holes.cells - 1.0);
+    // Half a footprint further no number is near a whole number of turns: the quotient's rounding decides nothing.
+    vec2 before = holes.cells * floor((cell + 0.5) * holes.turns);
+    cell = clamp(cell - before, vec2(0.0), holes.cells - 1.0);
     uint footprint = holes.start + uint(cell.y) * uint(holes.cells.x) + uint(cell.x);
     vec4 alphas = fetch_footprint(triangle_texel_place(footprint));
     vec2 sides = mix(alphas.xz, alphas.yw, part.x);

@@ -3,7 +3,7 @@
 #ifndef ANTUMBRA_DBUFFER_CUTOUTS_GLSL
 #define ANTUMBRA_DBUFFER_CUTOUTS_GLSL
 
-#include "common/materials.glsl"
+#include "common/holes.glsl"
 #include "dbuffer/coverage.glsl"
 
 // Line on the light, at places (u, v): where its value u x + v y + z is positive, a plane through the
@@ -64,9 +64,7 @@ void add_cutout(CoverageReceiver r, uint triangle, inout uvec2 seen) {
         return;
     }
     uint material = material_number(plane.w);
-    float alpha = fetch_base_color(material).a;
-    float cutoff = fetch_finish(material).z;
-    vec4 texture_place = fetch_texture(material);
+    Holes holes = fetch_holes(material);
     vec4 uv_ab = fetch_uv_texel(triangle_texel_place(2u * triangle));
     vec2 uv_c = fetch_uv_texel(triangle_texel_place(2u * triangle + 1u)).xy;
     while ((within.x | within.y) != 0u) {
@@ -79,7 +77,7 @@ void add_cutout(CoverageReceiver r, uint triangle, inout uvec2 seen) {
         weights = sum != 0.0 ? weights / sum : vec3(1.0, 0.0, 0.0);
         uvec2 bit = sample_index < 32u ? uvec2(1u << sample_index, 0u) : uvec2(0u, 1u << (sample_index - 32u));
         vec2 uv = weights.x * uv_ab.xy + weights.y * uv_ab.zw + weights.z * uv_c;
-        bool hole = alpha * texture_color(texture_place, uv).a < cutoff;
+        bool hole = is_hole_at(holes, uv);
         seen &= hole ? uvec2(0xffffffffu) : ~bit;
         within &= ~bit;
     }

@@ -3,7 +3,7 @@
 #define ANTUMBRA_DBUFFER_RAY_GLSL
 
 #include "common/hierarchy.glsl"
-#include "common/materials.glsl"
+#include "common/holes.glsl"
 #include "common/triangles.glsl"
 
 // 1 where triangles of the scene may have holes.

@@ -22,7 +22,7 @@ layout(set = 0, binding = 4) uniform sampler2D triangles;
 layout(set = 0, binding = 5) uniform sampler2D hierarchy;
 layout(set = 0, binding = 6) uniform sampler2D materials;
 layout(set = 0, binding = 7) uniform sampler2D uvs;
-layout(set = 0, binding = 8) uniform sampler2D texels;
+layout(set = 0, binding = 8) uniform sampler2D footprints;
 layout(set = 0, binding = 9) uniform usampler2D edges;
 layout(set = 0, binding = 10) uniform sampler2D points;
 layout(set = 0, binding = 11) uniform usampler2D numbers;
@@ -60,8 +60,8 @@ vec4 fetch_uv_texel(ivec2 place) {
     return texelFetch(uvs, place, 0);
 }
 
-vec4 fetch_texture_texel(ivec2 place) {
-    return texelFetch(texels, place, 0);
+vec4 fetch_footprint(ivec2 place) {
+    return texelFetch(footprints, place, 0);
 }
 
 uvec4 fetch_edge_texel(ivec2 place) {

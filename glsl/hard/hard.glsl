@@ -10,8 +10,8 @@
 #ifndef ANTUMBRA_HARD_GLSL
 #define ANTUMBRA_HARD_GLSL
 
+#include "common/holes.glsl"
 #include "common/light_view.glsl"
-#include "common/materials.glsl"
 #include "common/triangles.glsl"
 
 // Defined by the entry file: textureGather from a view's map.

@@ -26,7 +26,7 @@ layout(set = 0, binding = 8, std140) uniform Arguments {
 layout(set = 0, binding = 9) uniform usampler2D list;
 layout(set = 0, binding = 10) uniform sampler2D materials;
 layout(set = 0, binding = 11) uniform sampler2D uvs;
-layout(set = 0, binding = 12) uniform sampler2D texels;
+layout(set = 0, binding = 12) uniform sampler2D footprints;
 
 vec4 gather_map_depths(vec2 place, uint view) {
     return textureGather(map_depth, vec3(place, float(view)));
@@ -48,8 +48,8 @@ vec4 fetch_uv_texel(ivec2 place) {
     return texelFetch(uvs, place, 0);
 }
 
-vec4 fetch_texture_texel(ivec2 place) {
-    return texelFetch(texels, place, 0);
+vec4 fetch_footprint(ivec2 place) {
+    return texelFetch(footprints, place, 0);
 }
 
 float pixel_visibility(uvec2 pixel) {

@@ -3,7 +3,7 @@
 #ifndef ANTUMBRA_MDI_COVERAGE_GLSL
 #define ANTUMBRA_MDI_COVERAGE_GLSL
 
-#include "common/materials.glsl"
+#include "common/holes.glsl"
 #include "mdi/params.glsl"
 
 layout(local_size_x = 64) in;
@@ -14,7 +14,7 @@ layout(set = 0, binding = 0, std140) uniform MdiBlock {
 layout(set = 0, binding = 1) uniform sampler2D triangles;
 layout(set = 0, binding = 2) uniform sampler2D materials;
 layout(set = 0, binding = 3) uniform sampler2D triangle_uvs;
-layout(set = 0, binding = 4) uniform sampler2D texels;
+layout(set = 0, binding = 4) uniform sampler2D footprints;
 
 layout(push_constant) uniform Push {
     uint view;
@@ -39,8 +39,8 @@ vec4 fetch_uv_texel(ivec2 place) {
     return texelFetch(triangle_uvs, place, 0);
 }
 
-vec4 fetch_texture_texel(ivec2 place) {
-    return texelFetch(texels, place, 0);
+vec4 fetch_footprint(ivec2 place) {
+    return texelFetch(footprints, place, 0);
 }
 
 // Of a depth along the view, metres: what `place_of` takes.

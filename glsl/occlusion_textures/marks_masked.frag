@@ -1,10 +1,10 @@
 #version 460
 // Marks the slice that a surface lies in, but for holes where alpha cuts them.
+#include "common/holes.glsl"
 
-#include "common/materials.glsl"
 
 layout(set = 0, binding = 0) uniform sampler2D materials;
-layout(set = 0, binding = 1) uniform sampler2D texels;
+layout(set = 0, binding = 1) uniform sampler2D footprints;
 
 layout(push_constant) uniform Push {
     mat4 clip_from_scene;
@@ -23,8 +23,8 @@ vec4 fetch_material_texel(ivec2 place) {
     return texelFetch(materials, place, 0);
 }
 
-vec4 fetch_texture_texel(ivec2 place) {
-    return texelFetch(texels, place, 0);
+vec4 fetch_footprint(ivec2 place) {
+    return texelFetch(footprints, place, 0);
 }
 
 void main() {

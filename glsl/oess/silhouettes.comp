@@ -108,7 +108,7 @@ vec4 fetch_uv_texel(ivec2 place) {
     return vec4(0.0);
 }
 
-vec4 fetch_texture_texel(ivec2 place) {
+vec4 fetch_footprint(ivec2 place) {
     return vec4(0.0);
 }
 

@@ -26,7 +26,7 @@ layout(set = 0, binding = 8) uniform usampler2DArray outreach_backward;
 layout(set = 0, binding = 9) uniform sampler2D triangles;
 layout(set = 0, binding = 10) uniform sampler2D materials;
 layout(set = 0, binding = 11) uniform sampler2D uvs;
-layout(set = 0, binding = 12) uniform sampler2D texels;
+layout(set = 0, binding = 12) uniform sampler2D footprints;
 layout(set = 0, binding = 13, r32f) uniform image2D visibility;
 layout(set = 0, binding = 14, std140) uniform Arguments {
     TileArguments arguments;
@@ -95,8 +95,8 @@ vec4 fetch_uv_texel(ivec2 place) {
     return texelFetch(uvs, place, 0);
 }
 
-vec4 fetch_texture_texel(ivec2 place) {
-    return texelFetch(texels, place, 0);
+vec4 fetch_footprint(ivec2 place) {
+    return texelFetch(footprints, place, 0);
 }
 
 // A point of the line as the receiver sees it, from the map of one sector.

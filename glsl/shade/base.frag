@@ -4,6 +4,7 @@
 
 #include "common/camera.glsl"
 #include "common/materials.glsl"
+#include "common/textures.glsl"
 #include "common/triangles.glsl"
 
 // 0 where no material has a texture.

@@ -25,28 +25,27 @@ layout(set = 0, binding = 1, std140) uniform ShaftBlock {
 layout(set = 0, binding = 2, r32f) uniform readonly image2D view_depth;
 layout(set = 0, binding = 3, r32ui) uniform readonly uimage2D ids;
 layout(set = 0, binding = 4, rgba32f) uniform readonly image2D triangles;
-layout(set = 0, binding = 5, rgba32f) uniform readonly image2D hierarchy;
-layout(set = 0, binding = 6, rgba32f) uniform readonly image2D materials;
-layout(set = 0, binding = 7, rgba32f) uniform readonly image2D uvs;
-layout(set = 0, binding = 8) uniform sampler2D texels;
-layout(set = 0, binding = 9, std140) uniform Arguments {
+layout(set = 0, binding = 5, rgba32f) uniform readonly image2D materials;
+layout(set = 0, binding = 6, rgba32f) uniform readonly image2D uvs;
+layout(set = 0, binding = 7, rgba8) uniform readonly image2D footprints;
+layout(set = 0, binding = 8, std140) uniform Arguments {
     TileArguments arguments;
 };
-layout(set = 0, binding = 10) uniform usampler2D list;
-layout(set = 0, binding = 11, rgba32f) uniform readonly image2D shafts;
-layout(set = 0, binding = 12, r32ui) uniform readonly uimage2D edge_pool;
-layout(set = 0, binding = 13, rgba32ui) uniform readonly uimage2D lists;
-layout(set = 0, binding = 14, r32f) uniform writeonly image2D visibility;
-layout(set = 0, binding = 15, rgba32ui) uniform readonly uimage2D tasks;
-layout(set = 0, binding = 16, r32ui) uniform uimage2D words;
-layout(set = 0, binding = 17, r32ui) uniform readonly uimage2D triangle_pool;
-layout(set = 0, binding = 18, r32ui) uniform uimage2D estimates;
+layout(set = 0, binding = 9) uniform usampler2D list;
+layout(set = 0, binding = 10, rgba32f) uniform readonly image2D shafts;
+layout(set = 0, binding = 11, r32ui) uniform readonly uimage2D edge_pool;
+layout(set = 0, binding = 12, rgba32ui) uniform readonly uimage2D lists;
+layout(set = 0, binding = 13, r32f) uniform writeonly image2D visibility;
+layout(set = 0, binding = 14, rgba32ui) uniform readonly uimage2D tasks;
+layout(set = 0, binding = 15, r32ui) uniform uimage2D words;
+layout(set = 0, binding = 16, r32ui) uniform readonly uimage2D triangle_pool;
+layout(set = 0, binding = 17, r32ui) uniform uimage2D estimates;
 
 // Receivers whose numbers of triangles have no room in digits: of an invocation each its task.
-layout(set = 0, binding = 19, std430) buffer SpilledArguments {
+layout(set = 0, binding = 18, std430) buffer SpilledArguments {
     TileArguments spilled;
 };
-layout(set = 0, binding = 20, r32ui) uniform uimage2D spilled_tasks;
+layout(set = 0, binding = 19, r32ui) uniform uimage2D spilled_tasks;
 // 1 where these are worked on, an invocation each.
 layout(constant_id = 6) const uint SPILLED = 0u;
 const uint INVOCATIONS = 16u;
@@ -65,8 +64,9 @@ vec4 fetch_triangle_texel(uint texel) {
     return imageLoad(triangles, triangle_texel_place(texel));
 }
 
+// No node is looked at here.
 vec4 fetch_node_texel(ivec2 place) {
-    return imageLoad(hierarchy, place);
+    return vec4(0.0);
 }
 
 vec4 fetch_shaft_texel(ivec2 place) {
@@ -81,8 +81,8 @@ vec4 fetch_uv_texel(ivec2 place) {
     return imageLoad(uvs, place);
 }
 
-vec4 fetch_texture_texel(ivec2 place) {
-    return texelFetch(texels, place, 0);
+vec4 fetch_footprint(ivec2 place) {
+    return imageLoad(footprints, place);
 }
 
 // A receiver, and what its own plane hides.

@@ -9,8 +9,8 @@
 #ifndef ANTUMBRA_SHAFT_MASKS_MASKS_GLSL
 #define ANTUMBRA_SHAFT_MASKS_MASKS_GLSL
 
+#include "common/holes.glsl"
 #include "common/light.glsl"
-#include "common/materials.glsl"
 #include "shaft_masks/shaft.glsl"
 #include "shaft_masks/words.glsl"
 
@@ -431,9 +431,7 @@ Hidden hidden_by(MaskReceiver receiver, LightFrom light, Blocker blocker) {
 // other, whosoever it is, because a vector of them waits for the one that has the most. already: what others hide.
 void cut_holes(Blocker blocker, uint block, uvec2 already[4], inout Hidden hidden[4]) {
     uint material = material_number(blocker.plane.w);
-    vec4 texture_place = fetch_texture(material);
-    float cutoff = fetch_finish(material).z;
-    float alpha = fetch_base_color(material).a;
+    Holes holes = fetch_holes(material);
     // Along the columns the coordinates of the corners, and ones.
     vec4 ab = fetch_uv_texel(triangle_texel_place(2u * blocker.triangle));
     vec2 c = fetch_uv_texel(triangle_texel_place(2u * blocker.triangle + 1u)).xy;
@@ -463,7 +461,7 @@ void cut_holes(Blocker blocker, uint block, uvec2 already[4], inout Hidden hidde
         }
         vec3 uvw = vec3(x, row.x, 1.0) * place;
         vec2 uv = uvw.z != 0.0 ? uvw.xy / uvw.z : ab.xy;
-        bool hole = alpha * texture_color(texture_place, uv).a < cutoff;
+        bool hole = is_hole_at(holes, uv);
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {
             uvec2 mine = i == at ? taken : uvec2(0u);
             rest[i] &= ~mine;

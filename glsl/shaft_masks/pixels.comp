@@ -28,7 +28,7 @@ layout(set = 0, binding = 4, rgba32f) uniform readonly image2D triangles;
 layout(set = 0, binding = 5, rgba32f) uniform readonly image2D hierarchy;
 layout(set = 0, binding = 6, rgba32f) uniform readonly image2D materials;
 layout(set = 0, binding = 7, rgba32f) uniform readonly image2D uvs;
-layout(set = 0, binding = 8) uniform sampler2D texels;
+layout(set = 0, binding = 8, rgba8) uniform readonly image2D footprints;
 layout(set = 0, binding = 9, std140) uniform Arguments {
     TileArguments arguments;
 };
@@ -83,8 +83,8 @@ vec4 fetch_uv_texel(ivec2 place) {
     return imageLoad(uvs, place);
 }
 
-vec4 fetch_texture_texel(ivec2 place) {
-    return texelFetch(texels, place, 0);
+vec4 fetch_footprint(ivec2 place) {
+    return imageLoad(footprints, place);
 }
 
 // What holds every segment from a point to the light, around the point: half-spaces dot(n, x) <= 0 and a box.

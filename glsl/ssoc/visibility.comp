@@ -51,7 +51,7 @@ layout(set = 0, binding = 12) uniform usampler2D ids;
 layout(set = 0, binding = 13) uniform sampler2D triangles;
 layout(set = 0, binding = 14) uniform sampler2D materials;
 layout(set = 0, binding = 15) uniform sampler2D uvs;
-layout(set = 0, binding = 16) uniform sampler2D texels;
+layout(set = 0, binding = 16) uniform sampler2D footprints;
 layout(set = 0, binding = 17) uniform usampler2DArray map_second;
 
 #include "ssoc/cells.glsl"
@@ -78,8 +78,8 @@ vec4 fetch_uv_texel(ivec2 at) {
     return texelFetch(uvs, at, 0);
 }
 
-vec4 fetch_texture_texel(ivec2 at) {
-    return texelFetch(texels, at, 0);
+vec4 fetch_footprint(ivec2 at) {
+    return texelFetch(footprints, at, 0);
 }
 
 vec4 gather_map_depths(vec2 at, uint index) {

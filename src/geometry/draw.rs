@@ -23,7 +23,7 @@ pub fn read_for_draw(pass: &mut PassBuilder<'_, '_>, scene: &SceneBuffers, ids: 
     if scene.has_masks() {
         pass.read(ids.mask_uvs, Access::Vertex);
         pass.read(ids.materials, Access::Sampled(Stage::Fragment));
-        pass.read(ids.texels, Access::Sampled(Stage::Fragment));
+        pass.read(ids.footprints, Access::Sampled(Stage::Fragment));
     }
 }
 
@@ -114,7 +114,7 @@ pub struct SceneShaders {
     /// For solid triangles; its first vertex stream is of [`SceneIds::vertices`].
     pub solid: GraphicsPipelineDesc,
     /// For triangles with holes cut by alpha; as well, and the second is of [`SceneIds::mask_uvs`].
-    /// Bindings 0 and 1 are [`SceneIds::materials`] and [`SceneIds::texels`].
+    /// Bindings 0 and 1 are [`SceneIds::materials`] and [`SceneIds::footprints`].
     pub masked: GraphicsPipelineDesc,
 }
 
@@ -149,7 +149,7 @@ pub fn draw_part_with(
         let nearest = SamplerDesc::nearest();
         let bindings = [
             Bind::sampled(0, ids.materials, nearest),
-            Bind::sampled(1, ids.texels, nearest),
+            Bind::sampled(1, ids.footprints, nearest),
         ];
         ctx.bind_graphics(shaders.masked.clone(), &bindings, &push(run.mask))?;
         ctx.bind_vertices(&[(ids.vertices, 0), (ids.mask_uvs, 0)])?;

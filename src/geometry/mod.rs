@@ -12,6 +12,7 @@ mod camera;
 mod convex;
 mod cover;
 mod draw;
+mod footprints;
 mod gbuffer;
 mod hierarchy;
 mod neighbours;

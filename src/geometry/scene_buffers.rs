@@ -90,11 +90,11 @@ pub struct SceneBuffers {
 
 /// Number of buffers: vertices, texture coordinates of masked ones, indices.
 const BUFFERS: usize = 3;
-/// Number of images: triangles, texture coordinates, materials, texels, hierarchy, neighbours, edges,
-/// their ends.
-const IMAGES: usize = 8;
+/// Number of images: triangles, texture coordinates, materials, texels, footprints, hierarchy,
+/// neighbours, edges, their ends.
+const IMAGES: usize = 9;
 /// Place of the edges among the images; that of their ends is the next.
-const EDGES: usize = 6;
+const EDGES: usize = 7;
 
 #[derive(Debug)]
 struct DeviceBuffers {
@@ -123,8 +123,11 @@ pub struct SceneIds {
     pub triangle_uvs: ImageId,
     /// `common/materials.glsl`.
     pub materials: ImageId,
-    /// Texels of all textures: `common/materials.glsl`.
+    /// Texels of all textures: `common/textures.glsl`.
     pub texels: ImageId,
+    /// RGBA8_UNORM: alphas that holes are cut by, four that lie beside each other, `common/holes.glsl`;
+    /// a texel of nothing where there are no holes.
+    pub footprints: ImageId,
     /// Bounding volume hierarchy of the triangles: `common/hierarchy.glsl`.
     pub hierarchy: ImageId,
     /// RGBA32_UINT: edges with the faces that meet there, `silhouettes/edges.glsl`; a texel of
@@ -137,9 +140,9 @@ pub struct SceneIds {
 }
 
 impl SceneIds {
-    /// The images that shaders look alpha up in.
+    /// The images that shaders look for holes in.
     pub fn mask_images(&self) -> [ImageId; 3] {
-        [self.triangle_uvs, self.materials, self.texels]
+        [self.triangle_uvs, self.materials, self.footprints]
     }
 }
 
@@ -161,7 +164,8 @@ impl SceneBuffers {
             return Err(UploadError::TooManyTriangles { triangles, most });
         }
         let layout = Layout::new(scene);
-        let (texels, most) = (layout.texels.len(), most_rows * IMAGE_WIDTH);
+        let texels = layout.texels.len().max(layout.footprints.len());
+        let most = most_rows * IMAGE_WIDTH;
         if texels > most {
             return Err(UploadError::TooManyTexels { texels, most });
         }
@@ -284,6 +288,7 @@ impl SceneBuffers {
                     image(floats, layout.triangle_uvs.len()),
                     image(floats, layout.materials.len()),
                     image(vk::Format::R8G8B8A8_SRGB, layout.texels.len()),
+                    image(vk::Format::R8G8B8A8_UNORM, layout.footprints.len()),
                     image(floats, hierarchy::NODE_TEXELS * nodes),
                     image(vk::Format::R32G32B32A32_UINT, layout.triangles.len() / 4),
                     // Edges and their ends, of which there are none yet.
@@ -360,6 +365,7 @@ impl SceneBuffers {
             ),
             ("scene materials", bytemuck::cast_slice(&layout.materials)),
             ("scene texels", bytemuck::cast_slice(&layout.texels)),
+            ("scene footprints", bytemuck::cast_slice(&layout.footprints)),
             ("scene hierarchy", bytemuck::cast_slice(&nodes)),
             ("scene neighbours", bytemuck::cast_slice(&neighbours)),
             ("scene edges", &[]),
@@ -536,8 +542,9 @@ impl SceneBuffers {
             triangle_uvs: image("scene.triangle_uvs", 1),
             materials: image("scene.materials", 2),
             texels: image("scene.texels", 3),
-            hierarchy: image("scene.hierarchy", 4),
-            neighbours: image("scene.neighbours", 5),
+            footprints: image("scene.footprints", 4),
+            hierarchy: image("scene.hierarchy", 5),
+            neighbours: image("scene.neighbours", 6),
             edges: image("scene.edges", EDGES),
             points: image("scene.points", EDGES + 1),
         }

@@ -1,11 +1,13 @@
 //! A scene laid out for the device, before it is there.
 
 use super::cover::Cover;
+use super::footprints::footprints;
 use super::scene_buffers::Draw;
 use super::tight_box::tight_box;
-use crate::scene::{Aabb, Material, Primitive, Scene, Wrap};
+use crate::scene::{Aabb, Material, Primitive, Scene, Texture, Wrap};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
+use std::collections::BTreeSet;
 
 /// Width in texels of the images that hold the scene: `TRIANGLE_IMAGE_WIDTH` in
 /// `common/triangles.glsl`.
@@ -41,6 +43,8 @@ pub(super) struct Layout {
     pub materials: Vec<[f32; 4]>,
     /// Texels of all textures, rows of [`IMAGE_WIDTH`].
     pub texels: Vec<[u8; 4]>,
+    /// Of all textures that cut holes, rows of [`IMAGE_WIDTH`]: `common/holes.glsl`.
+    pub footprints: Vec<[u8; 4]>,
     /// Neighbouring triangles of one primitive, with the box around them.
     pub draws: Vec<Draw>,
     /// The largest flat parts that hide what is behind them.
@@ -79,7 +83,8 @@ impl Layout {
             ..Self::default()
         };
         let rows = layout.add_textures(scene);
-        layout.materials = materials(scene, &rows);
+        let hole_rows = layout.add_footprints(scene);
+        layout.materials = materials(scene, &rows, &hole_rows);
         let chunk = (scene.triangle_count() / CHUNKS).max(LEAST_IN_CHUNK);
         for kind in [Kind::Masked, Kind::Textured, Kind::Plain] {
             for primitive in &scene.primitives {
@@ -113,6 +118,31 @@ impl Layout {
                 row
             })
             .collect()
+    }
+
+    /// Adds the footprints of all textures that cut holes, once for each way that they are
+    /// repeated; returns each material's first row, 0 for those without holes.
+    fn add_footprints(&mut self, scene: &Scene) -> Vec<usize> {
+        let masked = |primitive: &&Primitive| kind_of(scene, primitive) == Some(Kind::Masked);
+        let masked = scene.primitives.iter().filter(masked);
+        let masked: BTreeSet<usize> = masked.map(|primitive| primitive.material).collect();
+        let mut rows = vec![0; scene.materials.len()];
+        let mut known: Vec<(Texture, usize)> = Vec::new();
+        for material in masked {
+            let Some(texture) = scene.materials[material].base_texture else {
+                continue;
+            };
+            let found = known.iter().find(|(known, _)| *known == texture);
+            rows[material] = found.map_or(self.footprints.len() / IMAGE_WIDTH, |(_, row)| *row);
+            if found.is_none() {
+                let image = &scene.images[texture.image];
+                self.footprints.extend(footprints(image, texture.wrap));
+                let rows_now = self.footprints.len().div_ceil(IMAGE_WIDTH);
+                self.footprints.resize(rows_now * IMAGE_WIDTH, [0; 4]);
+                known.push((texture, rows[material]));
+            }
+        }
+        rows
     }
 
     fn add(&mut self, primitive: &Primitive, kind: Kind, chunk: usize) {
@@ -291,8 +321,9 @@ pub fn image_place(count: usize) -> [u32; 2] {
 }
 
 /// The texels of all materials: `common/materials.glsl`.
-fn materials(scene: &Scene, rows: &[usize]) -> Vec<[f32; 4]> {
-    let texels = scene.materials.iter().flat_map(|material| {
+fn materials(scene: &Scene, rows: &[usize], hole_rows: &[usize]) -> Vec<[f32; 4]> {
+    let materials = scene.materials.iter().zip(hole_rows);
+    let texels = materials.flat_map(|(material, hole_row)| {
         let texture = material.base_texture.and_then(|texture| {
             let image = scene.images.get(texture.image)?;
             let [u, v] = texture.wrap.map(|wrap| match wrap {
@@ -311,7 +342,7 @@ fn materials(scene: &Scene, rows: &[usize]) -> Vec<[f32; 4]> {
                 material.roughness,
                 material.metallic,
                 material.mask_cutoff().unwrap_or(0.0),
-                0.0,
+                *hole_row as f32,
             ],
             emissive.extend(0.0).to_array(),
         ]
@@ -507,6 +538,10 @@ mod tests {
         // The unused image takes no room.
         assert_eq!(layout.texels.len(), IMAGE_WIDTH);
         assert_eq!(layout.materials[5], [0.0, 3.0, 2.0, 1.0 + 3.0 * 2.0]);
+        // Mirrored they are twice as many across, clamped one more down: once for all materials.
+        assert_eq!(layout.footprints.len(), IMAGE_WIDTH);
+        assert_eq!(layout.footprints[17], [9; 4]);
+        assert_eq!(layout.footprints[18], [0; 4]);
     }
 
     #[test]

@@ -32,14 +32,14 @@ pub(super) fn record_uploads(
     Ok(())
 }
 
-/// What an image of the scene is used for. Those of whole texels of four numbers are read as storage images, too: on
-/// lavapipe such a read takes half the time of one through a sampler.
+/// What an image of the scene is used for. Those of four numbers a texel, but for colours, are read as storage images,
+/// too: on lavapipe such a read takes half the time of one through a sampler.
 pub(super) fn usage_of(desc: &ImageDesc) -> vk::ImageUsageFlags {
     let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
     match desc.format {
-        vk::Format::R32G32B32A32_SFLOAT | vk::Format::R32G32B32A32_UINT => {
-            usage | vk::ImageUsageFlags::STORAGE
-        }
+        vk::Format::R32G32B32A32_SFLOAT
+        | vk::Format::R32G32B32A32_UINT
+        | vk::Format::R8G8B8A8_UNORM => usage | vk::ImageUsageFlags::STORAGE,
         _ => usage,
     }
 }
@@ -139,10 +139,9 @@ fn upload_image(
     texels: &[u8],
     staging: &mut Vec<Buffer>,
 ) -> Result<(), GpuError> {
-    let texel_bytes = if desc.format == vk::Format::R8G8B8A8_SRGB {
-        4
-    } else {
-        16
+    let texel_bytes = match desc.format {
+        vk::Format::R8G8B8A8_SRGB | vk::Format::R8G8B8A8_UNORM => 4,
+        _ => 16,
     };
     let size = desc.width as usize * desc.height as usize * texel_bytes;
     let Some(source) = stage(gpu, graph, texels, size, staging)? else {

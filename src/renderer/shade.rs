@@ -115,7 +115,7 @@ pub fn add_shading(graph: &mut Graph<'_>, inputs: &ShadingInputs<'_>) -> Shading
     for image in [gbuffer.ids, gbuffer.view_depth, ids.triangles] {
         pass.read(image, fragment);
     }
-    for image in ids.mask_images() {
+    for image in [ids.triangle_uvs, ids.materials, ids.texels] {
         pass.read(image, fragment);
     }
     let mut radiance = pass.color(radiance, Load::Discard);

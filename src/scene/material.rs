@@ -119,7 +119,7 @@ pub struct TextureImage {
 impl TextureImage {
     /// Alpha at `uv`, bilinear between texel centres: texel (i, j) has its centre at
     /// ((i + 0.5) / width, (j + 0.5) / height). 1 where `uv` is not finite. Twin of
-    /// `texture_alpha` in `common/textures.glsl`.
+    /// `is_hole_at` in `common/holes.glsl`.
     pub fn alpha(&self, uv: Vec2, wrap: [Wrap; 2]) -> f32 {
         let size = Vec2::new(self.width as f32, self.height as f32);
         let place = uv * size - 0.5;

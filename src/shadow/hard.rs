@@ -128,7 +128,7 @@ pub(super) fn add_hard_at<'f>(
             Bind::sampled(9, list.tiles, nearest),
             Bind::sampled(10, ids.materials, nearest),
             Bind::sampled(11, ids.triangle_uvs, nearest),
-            Bind::sampled(12, ids.texels, nearest),
+            Bind::sampled(12, ids.footprints, nearest),
         ];
         // Four steps of the grid that vertices snap to: SNAP_TEXELS in hard.glsl.
         let steps = ctx.gpu().info().limits.sub_pixel_precision_bits.min(16);

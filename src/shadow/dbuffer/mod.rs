@@ -226,7 +226,7 @@ fn add_visibility<'f>(
             Bind::uniform(1, params),
             Bind::sampled(6, ids.materials, nearest),
             Bind::sampled(7, ids.triangle_uvs, nearest),
-            Bind::sampled(8, ids.texels, nearest),
+            Bind::sampled(8, ids.footprints, nearest),
             Bind::sampled(12, pool, nearest),
             Bind::sampled(13, lists, nearest),
             Bind::sampled(14, hard, nearest),

@@ -200,7 +200,7 @@ impl Coverage {
                 Bind::sampled(1, ids.triangles, nearest),
                 Bind::sampled(2, ids.materials, nearest),
                 Bind::sampled(3, ids.triangle_uvs, nearest),
-                Bind::sampled(4, ids.texels, nearest),
+                Bind::sampled(4, ids.footprints, nearest),
             ];
             bindings.extend(extra);
             let Some(large) = large else {

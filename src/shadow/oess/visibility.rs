@@ -190,7 +190,7 @@ impl Line {
                 Bind::sampled(9, ids.triangles, nearest),
                 Bind::sampled(10, ids.materials, nearest),
                 Bind::sampled(11, ids.triangle_uvs, nearest),
-                Bind::sampled(12, ids.texels, nearest),
+                Bind::sampled(12, ids.footprints, nearest),
                 Bind::storage_image(13, images.visibility),
                 Bind::uniform(14, list.arguments),
                 Bind::sampled(15, list.tiles, nearest),

@@ -125,7 +125,6 @@ impl Masks {
             gbuffer.view_depth,
             gbuffer.ids,
             ids.triangles,
-            ids.hierarchy,
             shafts,
             edges,
             triangles,
@@ -133,13 +132,12 @@ impl Masks {
             tasks,
             ids.triangle_uvs,
             ids.materials,
+            ids.footprints,
         ];
         for image in images {
             pass.read(image, Access::StorageRead(Stage::Compute));
         }
-        for image in [list, ids.texels] {
-            pass.read(image, Access::Sampled(Stage::Compute));
-        }
+        pass.read(list, Access::Sampled(Stage::Compute));
         pass.read(arguments, Access::Indirect);
         pass.read(arguments, Access::Uniform(Stage::Compute));
         let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
@@ -191,22 +189,21 @@ impl Masks {
                 Bind::storage_image(2, gbuffer.view_depth),
                 Bind::storage_image(3, gbuffer.ids),
                 Bind::storage_image(4, ids.triangles),
-                Bind::storage_image(5, ids.hierarchy),
-                Bind::storage_image(6, ids.materials),
-                Bind::storage_image(7, ids.triangle_uvs),
-                Bind::sampled(8, ids.texels, nearest),
-                Bind::uniform(9, arguments),
-                Bind::sampled(10, list, nearest),
-                Bind::storage_image(11, shafts),
-                Bind::storage_image(12, edges),
-                Bind::storage_image(13, lists),
-                Bind::storage_image(14, visibility),
-                Bind::storage_image(15, tasks),
-                Bind::storage_image(16, words),
-                Bind::storage_image(17, triangles),
-                Bind::storage_image(18, estimates),
-                Bind::storage_buffer(19, spills.arguments),
-                Bind::storage_image(20, spills.tiles),
+                Bind::storage_image(5, ids.materials),
+                Bind::storage_image(6, ids.triangle_uvs),
+                Bind::storage_image(7, ids.footprints),
+                Bind::uniform(8, arguments),
+                Bind::sampled(9, list, nearest),
+                Bind::storage_image(10, shafts),
+                Bind::storage_image(11, edges),
+                Bind::storage_image(12, lists),
+                Bind::storage_image(13, visibility),
+                Bind::storage_image(14, tasks),
+                Bind::storage_image(15, words),
+                Bind::storage_image(16, triangles),
+                Bind::storage_image(17, estimates),
+                Bind::storage_buffer(18, spills.arguments),
+                Bind::storage_image(19, spills.tiles),
             ];
             let pipeline = ComputePipelineDesc {
                 constants,

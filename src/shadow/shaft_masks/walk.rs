@@ -107,15 +107,14 @@ impl Masks {
             ids.hierarchy,
             ids.materials,
             ids.triangle_uvs,
+            ids.footprints,
             shafts,
             lists,
         ];
         for image in images {
             pass.read(image, Access::StorageRead(Stage::Compute));
         }
-        for image in [partial.tiles, ids.texels] {
-            pass.read(image, Access::Sampled(Stage::Compute));
-        }
+        pass.read(partial.tiles, Access::Sampled(Stage::Compute));
         pass.read(arguments, Access::Indirect);
         pass.read(arguments, Access::Uniform(Stage::Compute));
         let words = pass.write(words, Access::StorageReadWrite(Stage::Compute));
@@ -152,7 +151,7 @@ impl Masks {
                 Bind::storage_image(5, ids.hierarchy),
                 Bind::storage_image(6, ids.materials),
                 Bind::storage_image(7, ids.triangle_uvs),
-                Bind::sampled(8, ids.texels, nearest),
+                Bind::storage_image(8, ids.footprints),
                 Bind::uniform(9, arguments),
                 Bind::sampled(10, partial.tiles, nearest),
                 Bind::storage_image(11, shafts),

@@ -425,7 +425,7 @@ fn add_visibility<'f>(
             Bind::sampled(13, ids.triangles, nearest),
             Bind::sampled(14, ids.materials, nearest),
             Bind::sampled(15, ids.triangle_uvs, nearest),
-            Bind::sampled(16, ids.texels, nearest),
+            Bind::sampled(16, ids.footprints, nearest),
             Bind::sampled(17, second, nearest).array(),
         ];
         let steps = ctx.gpu().info().limits.sub_pixel_precision_bits.min(16);

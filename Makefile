@@ -103,7 +103,7 @@ cluster-check:
 	scripts/cluster_check.sh
 
 # Without the layer first: what grows there is ours or the driver's. With it, blocks of device memory are kept out of
-# malloc's heap, where what the layer allocates between them would make ever more holes: see docs/robustness.md.
+# malloc's heap, where what is allocated between them makes ever more holes: see docs/robustness.md.
 soak:
 	scripts/setup.sh test
 	ANTUMBRA_SOAK_PLAIN=1 cargo test --test capture_soak -- --ignored --nocapture ten_thousand_frames

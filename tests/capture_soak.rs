@@ -52,7 +52,7 @@ impl Course {
 
     /// A renderer for the first scene of several.
     fn renderer(scene: Scene) -> FrameRenderer<'static> {
-        // Without the layer: for telling its memory from ours.
+        // Without the layer, as the second run of `make soak`: for telling its memory from ours.
         let plain = std::env::var_os("ANTUMBRA_SOAK_PLAIN").is_some();
         let gpu = support::create(&GpuOptions {
             validation: !plain,
@@ -119,6 +119,28 @@ fn resident_bytes() -> u64 {
     pages.unwrap_or(0) * 4096
 }
 
+/// Bytes that `malloc` has given out and not got back, to us, the driver and the layer, and those that it holds free
+/// between them.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+fn malloc_bytes() -> [u64; 2] {
+    /// `struct mallinfo2` of glibc's `malloc.h`.
+    #[repr(C)]
+    struct Mallinfo([usize; 10]);
+    // SAFETY: it takes nothing, locks what it reads, and gives back ten numbers.
+    unsafe extern "C" {
+        safe fn mallinfo2() -> Mallinfo;
+    }
+    let Mallinfo([_, _, _, _, mapped, _, _, in_use, free, _]) = mallinfo2();
+    // What was mapped by itself for large requests is not among the arenas' bytes.
+    [in_use + mapped, free].map(|bytes| bytes as u64)
+}
+
+/// Not known here.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+fn malloc_bytes() -> [u64; 2] {
+    [0; 2]
+}
+
 /// What must not grow from one round through all scenes to the next.
 #[derive(Debug, PartialEq, Eq)]
 struct Held {
@@ -146,15 +168,16 @@ fn reserved_bytes(renderer: &FrameRenderer<'_>) -> u64 {
     report.total_capacity_bytes
 }
 
-/// Draws at least that many frames, in rounds through `scenes` scenes. In the second half of them the process,
-/// and the allocator's blocks, may take `growth` bytes more than in the first: a driver's caches fill, free memory
-/// between what is used becomes more, and the layer keeps the names of objects that are gone (3.6 kB a frame).
+/// Draws at least that many frames, in rounds through `scenes` scenes. In the second half of them the allocator's
+/// blocks, the process and what `malloc` has in use may take `growth` bytes more than in the first: a driver's caches
+/// fill, free memory between what is used becomes more, and the layer keeps the names of objects that are gone (3.6 kB
+/// a frame). What `malloc` has in use tells what somebody keeps from free memory between.
 fn soak(scenes: usize, frames: usize, growth: u64) {
     let _one = support::serial();
     let course = Course::new(scenes);
     let rounds = frames.div_ceil(course.period());
     let mut renderer = None;
-    let (mut held, mut grown) = (None, [0; 2]);
+    let (mut held, mut grown) = (None, [0; 3]);
     let begin = Instant::now();
     let mut last = 0;
     for round in 0..rounds {
@@ -164,20 +187,24 @@ fn soak(scenes: usize, frames: usize, growth: u64) {
         let renderer = renderer.as_ref().unwrap();
         support::assert_no_messages(&renderer.gpu().messages());
         let now = Held::of(renderer);
-        let bytes = [reserved_bytes(renderer), resident_bytes()];
-        let [reserved, resident] = bytes.map(|bytes| bytes as f64 * 1.0e-6);
+        let (reserved, resident) = (reserved_bytes(renderer), resident_bytes());
+        let [in_use, free] = malloc_bytes();
+        let [blocks, malloc, between, process] =
+            [reserved, in_use, free, resident].map(|bytes| bytes as f64 * 1.0e-6);
         println!(
-            "{:6} frames, {:.0?}: {now:?}, blocks {reserved:.1} MB, process {resident:.1} MB",
+            "{:6} frames, {:.0?}: {now:?}, blocks {blocks:.1} MB, malloc {malloc:.1} MB in use and {between:.1} MB \
+             free, process {process:.1} MB",
             (round + 1) * course.period(),
             begin.elapsed(),
         );
+        let bytes = [reserved, resident, in_use];
         // The first round makes what is kept, and drivers fill caches of their own.
         match round {
             0 => held = Some(now),
             _ => assert_eq!(held.as_ref(), Some(&now)),
         }
         if 2 * round < rounds {
-            grown = [0, 1].map(|at| bytes[at].max(grown[at]));
+            grown = [0, 1, 2].map(|at| bytes[at].max(grown[at]));
         }
         let flat = bytes
             .iter()
@@ -185,7 +212,7 @@ fn soak(scenes: usize, frames: usize, growth: u64) {
             .all(|(now, then)| *now <= then + growth);
         assert!(
             flat || rounds < 8,
-            "{bytes:?} bytes of memory after {grown:?}"
+            "bytes of blocks, process and malloc: {bytes:?} after {grown:?}"
         );
     }
     let messages = renderer.unwrap().destroy().unwrap();

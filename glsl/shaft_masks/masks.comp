@@ -139,6 +139,12 @@ vec3 fetch_edge_end(uint code) {
     return fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
 }
 
+// One of a tile's triangles by its number among all that are drawn, after the whole ones.
+Blocker fetch_other(Entries entries, uint number) {
+    uint place = entries.first + entries.room - 1u - (number - entries.whole);
+    return fetch_blocker(imageLoad(triangle_pool, triangle_texel_place(place)).x);
+}
+
 // Sets the bits of the samples that a triangle hides from four receivers.
 void add_blocker(MaskReceiver receivers[4], LightFrom lights[4], uint block, Blocker blocker, inout uvec2 blocked[4]) {
     Hidden hidden[4];
@@ -283,15 +289,29 @@ void main() {
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {
             lights[i] = rows_from(view.light, receivers[i].position);
         }
-        uint at_other = max(first, entries.whole);
+        uint begin = max(first, entries.whole);
         do {
-            if (at_other < end) {
-                uint place = entries.first + entries.room - 1u - (at_other - entries.whole);
-                Blocker blocker = fetch_blocker(imageLoad(triangle_pool, triangle_texel_place(place)).x);
+            // Of a run of triangles those that may hide anything from any of the invocation's receivers, half of them
+            // and less: to find that out takes a quarter of the time that it takes to find what.
+            uint run = end > begin ? min(end - begin, 32u) : 0u;
+            uint wanted = 0u;
+            uint at_other = 0u;
+            do {
+                Blocker blocker = fetch_other(entries, begin + at_other);
+                bool any_meets = false;
+                [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+                    any_meets = any_meets || outline_of(receivers[i], lights[i], blocker).meets;
+                }
+                wanted |= any_meets && at_other < run ? 1u << at_other : 0u;
+                at_other += 1u;
+            } while (at_other < run);
+            while (wanted != 0u) {
+                Blocker blocker = fetch_other(entries, begin + uint(findLSB(wanted)));
+                wanted &= wanted - 1u;
                 add_blocker(receivers, lights, block, blocker, blocked);
             }
-            at_other += 1u;
-        } while (at_other < end);
+            begin += 32u;
+        } while (begin < end);
     }
     if (SPILLED == 0u && is_spilled) {
         list_spilled(entry, block);

@@ -407,7 +407,16 @@ struct Hidden {
     mat3 weights;
 };
 
-Hidden hidden_by(MaskReceiver receiver, LightFrom light, Blocker blocker) {
+// A triangle as lines on the light, of its edges and its plane.
+struct Outline {
+    vec3 ab;
+    vec3 bc;
+    vec3 ca;
+    vec3 beyond;
+    bool meets; // whether it may hide any sample
+};
+
+Outline outline_of(MaskReceiver receiver, LightFrom light, Blocker blocker) {
     vec3 a = blocker.a - receiver.position;
     vec3 b = blocker.b - receiver.position;
     vec3 c = blocker.c - receiver.position;
@@ -415,16 +424,24 @@ Hidden hidden_by(MaskReceiver receiver, LightFrom light, Blocker blocker) {
     float rounding_m = POSITION_ROUNDING * max(extent.x, max(extent.y, extent.z));
     float height = dot(blocker.plane.xyz, a);
     float turn = height > 0.0 ? 1.0 : -1.0;
-    vec3 ab = line_of_plane(light, turn * exact_cross(a, b));
-    vec3 bc = line_of_plane(light, turn * exact_cross(b, c));
-    vec3 ca = line_of_plane(light, turn * exact_cross(c, a));
-    vec3 beyond = line_of_plane(light, turn * blocker.plane.xyz);
+    Outline outline;
+    outline.ab = line_of_plane(light, turn * exact_cross(a, b));
+    outline.bc = line_of_plane(light, turn * exact_cross(b, c));
+    outline.ca = line_of_plane(light, turn * exact_cross(c, a));
+    outline.beyond = line_of_plane(light, turn * blocker.plane.xyz);
     // What lies in the plane of the samples hides none of them, as what lies in the receiver does not hide it.
-    beyond.z -= LIGHT_SHAPE == LIGHT_SUN ? 0.0 : abs(height) + 4.0 * rounding_m;
-    float most = min(min(line_most(ab), line_most(bc)), min(line_most(ca), line_most(beyond)));
-    bool meets = most >= 0.0 && abs(height) > rounding_m && receiver.id != blocker.triangle + 1u;
-    uvec2 within = mask_of_lines(vec3[](ab, bc, ca, beyond), line_least(beyond) < 0.0);
-    return Hidden(meets ? within : uvec2(0u), mat3(bc, ca, ab));
+    outline.beyond.z -= LIGHT_SHAPE == LIGHT_SUN ? 0.0 : abs(height) + 4.0 * rounding_m;
+    float most = lesser(lesser(line_most(outline.ab), line_most(outline.bc)),
+        lesser(line_most(outline.ca), line_most(outline.beyond)));
+    outline.meets = most >= 0.0 && abs(height) > rounding_m && receiver.id != blocker.triangle + 1u;
+    return outline;
+}
+
+Hidden hidden_by(MaskReceiver receiver, LightFrom light, Blocker blocker) {
+    Outline outline = outline_of(receiver, light, blocker);
+    uvec2 within = mask_of_lines(vec3[](outline.ab, outline.bc, outline.ca, outline.beyond),
+        line_least(outline.beyond) < 0.0);
+    return Hidden(outline.meets ? within : uvec2(0u), mat3(outline.bc, outline.ca, outline.ab));
 }
 
 // Takes out the samples that are seen through holes, of four receivers: each invocation looks at one sample after the

@@ -290,28 +290,39 @@ void main() {
             lights[i] = rows_from(view.light, receivers[i].position);
         }
         uint begin = max(first, entries.whole);
-        do {
-            // Of a run of triangles those that may hide anything from any of the invocation's receivers, half of them
-            // and less: to find that out takes a quarter of the time that it takes to find what.
-            uint run = end > begin ? min(end - begin, 32u) : 0u;
-            uint wanted = 0u;
-            uint at_other = 0u;
+        // Masks of a line or a point take no longer than to find out whether there is anything in them.
+        bool at_once = LIGHT_SHAPE == LIGHT_LINE || LIGHT_SHAPE == LIGHT_POINT;
+        if (at_once) {
             do {
-                Blocker blocker = fetch_other(entries, begin + at_other);
-                bool any_meets = false;
-                [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-                    any_meets = any_meets || outline_of(receivers[i], lights[i], blocker).meets;
+                if (begin < end) {
+                    add_blocker(receivers, lights, block, fetch_other(entries, begin), blocked);
                 }
-                wanted |= any_meets && at_other < run ? 1u << at_other : 0u;
-                at_other += 1u;
-            } while (at_other < run);
-            while (wanted != 0u) {
-                Blocker blocker = fetch_other(entries, begin + uint(findLSB(wanted)));
-                wanted &= wanted - 1u;
-                add_blocker(receivers, lights, block, blocker, blocked);
-            }
-            begin += 32u;
-        } while (begin < end);
+                begin += 1u;
+            } while (begin < end);
+        } else {
+            do {
+                // Of a run of triangles those that may hide anything from any of the invocation's receivers, half of them
+                // and less: to find that out takes a quarter of the time that it takes to find what.
+                uint run = end > begin ? min(end - begin, 32u) : 0u;
+                uint wanted = 0u;
+                uint at_other = 0u;
+                do {
+                    Blocker blocker = fetch_other(entries, begin + at_other);
+                    bool any_meets = false;
+                    [[unroll]] for (uint i = 0u; i < 4u; ++i) {
+                        any_meets = any_meets || outline_of(receivers[i], lights[i], blocker).meets;
+                    }
+                    wanted |= any_meets && at_other < run ? 1u << at_other : 0u;
+                    at_other += 1u;
+                } while (at_other < run);
+                while (wanted != 0u) {
+                    Blocker blocker = fetch_other(entries, begin + uint(findLSB(wanted)));
+                    wanted &= wanted - 1u;
+                    add_blocker(receivers, lights, block, blocker, blocked);
+                }
+                begin += 32u;
+            } while (begin < end);
+        }
     }
     if (SPILLED == 0u && is_spilled) {
         list_spilled(entry, block);

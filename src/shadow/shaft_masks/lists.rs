@@ -2,8 +2,8 @@
 
 use super::walk::{WalkRest, runs_in_dispatch};
 use super::{
-    CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, OTHER_DISPATCH, PARTS, POOL_WIDTH, Sizes, part_list,
-    part_list_for_two, texels,
+    CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, OTHER_DISPATCH, PARTS, POOL_WIDTH, Sizes,
+    part_list, part_list_for_two, texels,
 };
 use crate::geometry::{TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};

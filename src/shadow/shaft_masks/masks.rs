@@ -175,7 +175,10 @@ impl Masks {
             (4, self.sizes.task_entries),
             (5, u32::from(matches!(step, Step::Others(_)))),
             (6, u32::from(matches!(step, Step::Spilled))),
-            (7, u32::from(!matches!(step, Step::Plain(_) | Step::Others(_)))),
+            (
+                7,
+                u32::from(!matches!(step, Step::Plain(_) | Step::Others(_))),
+            ),
         ];
         let dispatched = match step {
             Step::Pieces => OTHER_DISPATCH,

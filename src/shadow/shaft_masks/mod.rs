@@ -49,7 +49,9 @@ use super::uniform::add_uniform;
 use super::{ShadowInputs, ShadowMask, shape_number};
 use crate::geometry::{TILE_SIZE, TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
-use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage};
+use crate::graph::{
+    Access, Bind, BufferDesc, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage,
+};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 

@@ -52,7 +52,7 @@ impl Course {
 
     /// A renderer for the first scene of several.
     fn renderer(scene: Scene) -> FrameRenderer<'static> {
-        // Without the layer, as the second run of `make soak`: for telling its memory from ours.
+        // Without the layer, as the first run of `make soak`: for telling its memory from ours.
         let plain = std::env::var_os("ANTUMBRA_SOAK_PLAIN").is_some();
         let gpu = support::create(&GpuOptions {
             validation: !plain,

@@ -90,7 +90,7 @@ vec4 fetch_footprint(ivec2 place) {
     return vec4(0.0);
 }
 
-// What a edge adds to the number of triangles between a receiver and the middle of the light.
+// What an edge adds to the number of triangles between a receiver and the middle of the light.
 int edge_rounds(Projection projection, uint code) {
     uint triangle = (code & ~(EDGE_DOUBLE | EDGE_TURNED)) >> EDGE_CORNER_BITS;
     uint corner = code & ((1u << EDGE_CORNER_BITS) - 1u);

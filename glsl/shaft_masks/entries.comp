@@ -1,7 +1,7 @@
 #version 460
-// Entries for the masks of each tile, from its candidates: a workgroup each. What can be told of a tile once for all of
-// it is left to classes.comp, where it takes an invocation: a driver without branches goes through all of a shader for
-// each workgroup.
+// Entries of each group of tiles, from its candidates: a workgroup each. Its tiles take theirs from them in classes.comp,
+// where that and all else that is told of a tile once takes an invocation: a driver without branches goes through all of
+// a shader for each workgroup.
 //
 // Triangles that are between all surfaces and the light's plane and show one side to all surfaces are counted
 // by their edges. Seen from a surface each goes round its samples once, so that a sample's number of
@@ -14,6 +14,7 @@
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
 #include "shaft_masks/covers.glsl"
+#include "shaft_masks/edges.glsl"
 
 layout(local_size_x = 8) in; // one vector: a lane without a candidate costs as much as one with
 
@@ -41,7 +42,6 @@ layout(set = 0, binding = 12, r32ui) uniform writeonly uimage2D triangle_pool;
 
 const uint NO_NEIGHBOUR = 0xffffffffu;
 
-shared uint meeting_edges; // that meet the shaft
 shared uint count_sum;
 shared uint first_triangle;
 // Of a chunk, in bits 0 to 7 its edges, from 8 on its whole triangles, from 16 on others, from 24 on covers: one atomic
@@ -80,37 +80,11 @@ uint counted_side(Surfaces surfaces, Triangle t) {
     return is_whole(surfaces, t) ? triangle_side(surfaces, t.corners[0], t.plane.xyz) : SIDE_UNSURE;
 }
 
-// Whether light_from chooses the same axis of a sphere for all surfaces, with a margin.
-bool rows_have_one_axis(Light light, Surfaces surfaces) {
-    float along = abs(dot(surfaces.z, light.axis_x.xyz));
-    return abs(along - NEAR_AXIS) > surfaces.tilt + 1.0e-5;
-}
-
 // An edge of a counted triangle.
 struct Edge {
     uint code;
     bool is_kept;
-    bool meets; // the shaft
 };
-
-// An edge that is beyond the samples on the side that edges count towards, or beyond the ends of all rows, seen from
-// every surface, is left out.
-// one_axis: rows lie along the same axis of a sphere for all surfaces.
-bool edge_is_beyond(Shaft shaft, bool one_axis, vec3 a, vec3 b, out bool meets) {
-    float beyond = -1.0;
-    float outside = -1.0;
-    // The rows of a sphere's disk turn a little from pixel to pixel, and by a right angle where they lie along another
-    // axis; those of a rectangle rise: what is below it may cross them before their first sample.
-    uint last = LIGHT_SHAPE == LIGHT_SPHERE ? (one_axis ? 1u : 0u) : LIGHT_SHAPE == LIGHT_RECT ? 3u : 4u;
-    for (uint i = 0u; i < SHAFT_PLANES; ++i) {
-        vec4 plane = shaft.planes[i];
-        float both = lesser(dot(plane.xyz, a) - plane.w, dot(plane.xyz, b) - plane.w);
-        outside = both > outside ? both : outside;
-        beyond = both > beyond && i != 1u && i < last ? both : beyond;
-    }
-    meets = outside <= 0.0;
-    return beyond > 0.0;
-}
 
 // The edge of a counted triangle that begins at a corner. beside: its neighbour there.
 Edge edge_of(Shaft shaft, Surfaces surfaces, bool one_axis, uint triangle, uint corner, uint beside, vec3 a, vec3 b, uint side) {
@@ -125,7 +99,8 @@ Edge edge_of(Shaft shaft, Surfaces surfaces, bool one_axis, uint triangle, uint 
     bool fold = both && !goes_on;
     Edge edge;
     edge.code = triangle << EDGE_CORNER_BITS | corner | (fold ? EDGE_DOUBLE : 0u) | (side == SIDE_BACK ? EDGE_TURNED : 0u);
-    bool beyond = edge_is_beyond(shaft, one_axis, a, b, edge.meets);
+    bool meets_shaft; // is asked for each tile
+    bool beyond = edge_is_beyond(shaft, one_axis, a, b, meets_shaft);
     edge.is_kept = !goes_on && !(fold && other < triangle) && !beyond;
     return edge;
 }
@@ -143,7 +118,6 @@ void main() {
     // Only this workgroup writes them, and no texel that another invocation reads.
     uvec4 candidates = imageLoad(lists, list_place(part));
     if (lane == 0u) {
-        meeting_edges = 0u;
         count_sum = 0u;
         found[0] = 0u;
         first_triangle = atomicAdd(triangles_used, candidates.y);
@@ -160,11 +134,10 @@ void main() {
     uint chunk = candidates.x;
     uint turn = 0u;
     uint begin = 0u;
-    // All tiles have the same room, so that it is not by their order which of them have some.
+    // All groups have the same room, so that it is not by their order which of them have some.
     uint room = params.pattern.z / arguments.count;
     uvec4 counts = uvec4(0u); // edges, whole triangles, others, and covers of the chunks before
     uint own_sum = 0u;
-    bool any_meets = false;
     // Loops look at their end whether they go on: a driver without branches does one more turn of others, for nothing.
     do {
         uint end = min(CHUNK, candidates.y - begin);
@@ -204,7 +177,6 @@ void main() {
                     }
                     at += is_kept ? 1u : 0u;
                     own_sum += is_kept ? ((edges[corner].code & EDGE_DOUBLE) != 0u ? 2u : 1u) : 0u;
-                    any_meets = any_meets || (is_kept && edges[corner].meets);
                 }
                 uint whole = first + counts.y + (before >> 8 & 0xffu);
                 uint other = last - counts.z - (before >> 16 & 0xffu);
@@ -228,15 +200,12 @@ void main() {
         begin += CHUNK;
     } while (begin < candidates.y);
     atomicAdd(count_sum, own_sum);
-    if (any_meets) {
-        meeting_edges = 1u;
-    }
     barrier();
 
     // A texel an invocation, from the second on: those after them stay empty.
     uvec4 texel = uvec4(index * room, counts.x, first, candidates.y);
     texel = lane == 1u ? uvec4(counts.yz, 0u, 0u) : texel;
-    texel = lane == 2u ? uvec4(count_sum, meeting_edges, counts.w, 0u) : texel;
+    texel = lane == 2u ? uvec4(count_sum, counts.w, 0u, 0u) : texel;
     uint cover = lane == 4u ? 4u : 0u;
     uvec4 covering = uvec4(covers[cover], covers[cover + 1u], covers[cover + 2u], covers[cover + 3u]);
     texel = lane > 2u ? covering : texel;

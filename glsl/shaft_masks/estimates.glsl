@@ -11,6 +11,7 @@ const uint ESTIMATE_WORK = 3u;  // entries for each block of samples
 
 const uint LEVEL_LIT = 0x100u;
 const uint LEVEL_DARK = 0x101u;
+const uint LEVEL_OPEN = 0x102u; // not known yet
 
 const uint CHANGED_PIXEL = 1u << 20u;
 

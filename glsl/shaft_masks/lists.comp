@@ -1,12 +1,10 @@
 #version 460
-// Walks the hierarchy with the shaft of each listed tile, or part of one, to the end. A tile whose shaft meets no
-// triangle is lit and settled here. The others get a list of candidates: the triangles whose boxes the shaft meets,
-// but for those that lie in it together with their neighbours and show one side to all of the tile, whose edges all
-// cancel. Of a short list each triangle is looked at here: where none of them hides anything the tile is lit, too.
+// Walks the hierarchy with the shaft of each group of tiles, to the end, and lists its candidates: the triangles whose
+// boxes the shaft meets, but for those that lie in it together with their neighbours and show one side to all of the
+// group's surfaces, whose edges all cancel.
 
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
-#include "shaft_masks/estimates.glsl"
 #include "shaft_masks/lists.glsl"
 #include "shaft_masks/walk.glsl"
 
@@ -25,20 +23,14 @@ layout(set = 0, binding = 3, std140) uniform Arguments {
 layout(set = 0, binding = 4) uniform usampler2D list;
 layout(set = 0, binding = 5, rgba32f) uniform readonly image2D shafts;
 layout(set = 0, binding = 6, rgba32f) uniform readonly image2D triangles;
-layout(set = 0, binding = 7, std430) buffer PenumbraArguments {
-    TileArguments penumbra; // a workgroup each
-    TileArguments penumbra_groups; // an invocation each
-};
-layout(set = 0, binding = 8, r32ui) uniform writeonly uimage2D penumbra_list;
 layout(set = 0, binding = 9, std430) buffer Pool {
     uint chunks_used;
 };
 layout(set = 0, binding = 10, rgba32ui) uniform writeonly uimage2D pool;
 layout(set = 0, binding = 11, rgba32ui) uniform writeonly uimage2D lists;
-layout(set = 0, binding = 12, r32ui) uniform writeonly uimage2D estimates;
 
 // A software driver may end loops after 65,535 turns of all lanes of a vector together: a walk ends
-// itself before, and its tile is walked anew in pieces.
+// itself before, and the group's tiles are walked anew in pieces.
 const uint MOST_STEPS = 49152u; // of two nodes each
 
 vec4 fetch_triangle_texel(uint texel) {
@@ -56,7 +48,7 @@ vec4 fetch_shaft_texel(ivec2 place) {
 // 1 where all lists are made again, each with the same room: overflow.comp.
 layout(constant_id = 1) const uint AGAIN = 0u;
 
-// Where a tile's list goes on.
+// Where a group's list goes on.
 struct List {
     uint first; // its first chunk
     uint chunk; // its last one
@@ -96,7 +88,6 @@ void main() {
 
     uint nodes = params.counts.z;
     List found = List(0u, 0u, 0u, true);
-    bool any_cancels = false;
     // Triangles wait here until there is a chunk of them. Invocations of a vector wait for each other then, so that the
     // fewer stops a walk makes the better.
     uint waiting[CHUNK];
@@ -120,7 +111,6 @@ void main() {
             count += goes_on && before.is_met ? 1u : 0u;
             node = goes_on ? before.next : node;
             Step step = step_at(shaft, surfaces, node);
-            any_cancels = any_cancels || step.cancels;
             node = step.next;
             waiting[count] = step.triangle;
             count += step.is_met ? 1u : 0u;
@@ -132,28 +122,9 @@ void main() {
 
     // A driver may end the loops above by itself, too.
     found.complete = found.complete && node >= nodes;
-    uint short_list[SHORT_LIST];
-    for (uint i = 0u; i < SHORT_LIST; ++i) {
-        short_list[i] = waiting[i];
-    }
-    bool is_short = found.complete && count <= SHORT_LIST && found.count == 0u && !any_cancels && shaft.low.w > 0.0;
-    vec3 some = fetch_some_surface(part);
-    bool lit = is_short && !any_hides(view.light, surfaces, shaft, some, short_list, is_short ? count : 0u);
-    if (lit) {
-        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(LEVEL_LIT)); // as all is at the beginning
-    }
-    if (!lit && count > 0u && found.complete) {
+    if (count > 0u && found.complete) {
         list_chunk(found, waiting, count);
     }
-    if (!lit && AGAIN == 0u) {
-        uint at = atomicAdd(penumbra.count, 1u);
-        atomicMax(penumbra.groups_x, min(at + 1u, TILE_ROW));
-        atomicMax(penumbra.groups_y, at / TILE_ROW + 1u);
-        atomicMax(penumbra_groups.groups_x, at / PARTS_A_GROUP + 1u);
-        imageStore(penumbra_list, tile_entry_place(at, tiles), uvec4(entry));
-    }
-    if (!lit) {
-        uint resume = found.complete ? nodes : 0u;
-        imageStore(lists, list_place(part), uvec4(found.first, found.count, resume, TILE_OPEN));
-    }
+    uint resume = found.complete ? nodes : 0u;
+    imageStore(lists, list_place(part), uvec4(found.first, found.count, resume, TILE_OPEN));
 }

@@ -1,8 +1,8 @@
 // What is between a tile's surfaces and the light.
 //
-// The walk down the hierarchy lists candidates: chunks of a pool, linked, so that a list may have any
+// The walk down the hierarchy lists candidates of a group of tiles: chunks of a pool, linked, so that a list may have any
 // length. Where the pool is used up all lists are made again, each with the same room (overflow.comp).
-// Entries for the masks are made from candidates and lie side by side.
+// Entries are made from candidates and lie side by side; of a group's entries each tile takes its own for the masks.
 //
 // A long list is worked on in tasks of a fixed number of triangles. The first one is its tile's; the
 // others OR what they find to the tile's masks in memory. Of a tile with no list, or one with too many
@@ -18,10 +18,9 @@ const uint CHUNK = 32u;
 
 layout(constant_id = 4) const uint TASK_ENTRIES = 512u;
 
-// Texels of a tile in the image of lists, side by side: first chunk of candidates, their number, node
-// to walk from (beyond the last one if the list is whole, else 0), state; entries as below; what their edges
-// count in sum, whether any of them meets the shaft, number of triangles that may cover all of the light; the first
-// of these.
+// Texels of a group, or of a tile, in the image of lists, side by side: of a group the first chunk of candidates and their
+// number; node to walk from (beyond the last one if the list is whole, else 0); of a tile its state. Entries as below.
+// Of a group what its edges count in sum and the number of triangles that may cover all of the light; the first of these.
 const uint LIST_TEXELS = 6u;
 const uint TILE_OPEN = 0u;
 const uint TILE_SETTLED = 1u;

@@ -82,9 +82,9 @@ void main() {
 
     bool lit = !dark && node >= nodes && count <= SHORT_LIST && shaft.low.w > 0.0;
     lit = lit && !any_hides(view.light, surfaces, shaft, fetch_some_surface(part), short_list, count);
-    if (lit || dark) {
-        imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(dark ? LEVEL_DARK : LEVEL_LIT));
-    } else {
+    uint level = dark ? LEVEL_DARK : lit ? LEVEL_LIT : LEVEL_OPEN;
+    imageStore(estimates, estimate_place(part, ESTIMATE_LEVEL), uvec4(level));
+    if (level == LEVEL_OPEN) {
         uint at = atomicAdd(rest.count, 1u);
         atomicMax(rest.groups_x, at / PARTS_A_GROUP + 1u);
         imageStore(rest_list, tile_entry_place(at, tiles), uvec4(entry));

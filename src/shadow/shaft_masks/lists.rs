@@ -1,5 +1,6 @@
 //! The passes that find what is between tiles and the light.
 
+use super::groups::Groups;
 use super::walk::{WalkRest, runs_in_dispatch};
 use super::{
     CHUNK_TEXELS, LIST_TEXELS, Lists, Made, NAME, OTHER_DISPATCH, PARTS, POOL_WIDTH, Sizes,
@@ -22,22 +23,24 @@ pub(super) struct Making {
     pub estimates: ImageId,
 }
 
-/// What the passes that list candidates write.
+/// What the passes that list candidates write, and the pass after them completes.
 #[derive(Clone, Copy)]
 struct Listed {
-    penumbra: TileList,
+    groups: Groups,
     used: BufferId,
     pool: ImageId,
+    /// RGBA32_UINT, [`LIST_TEXELS`] texels a group, at the place of the part that leads it.
     lists: ImageId,
-    estimates: ImageId,
 }
 
-/// Candidates of tiles, between the two passes.
-struct Candidates {
-    tiles: TileList,
-    lists: ImageId,
-    pool: ImageId,
-    used: BufferId,
+/// Edges and triangles of groups.
+struct GroupEntries {
+    edges: ImageId,
+    triangles: ImageId,
+}
+
+/// What the pass that settles tiles by their entries fills; nothing is in it yet.
+struct Kinds {
     further: BufferId,
     partial: TileList,
     walk_rest: WalkRest,
@@ -63,9 +66,9 @@ impl Making {
             estimates: self.estimates,
         };
         let (rest, made) = self.add_settled(graph, inputs, parts, made);
-        let (candidates, made) = self.add_candidates(graph, inputs, rest, made);
-        let (candidates, entries) = self.add_entries(graph, inputs, candidates);
-        self.add_classes(graph, inputs, candidates, entries, made)
+        let (mut listed, kinds) = self.add_candidates(graph, inputs, made);
+        let entries = self.add_entries(graph, inputs, &mut listed);
+        self.add_classes(graph, inputs, (rest, listed, entries), kinds, made)
     }
 
     /// Declares the passes that settle tiles by a short walk; returns the list of the others.
@@ -128,18 +131,18 @@ impl Making {
         (rest, made)
     }
 
+    /// Declares the passes that group the tiles that are left and list candidates of groups.
     fn add_candidates(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        rest: TileList,
         made: Made,
-    ) -> (Candidates, Made) {
+    ) -> (Listed, Kinds) {
         let name = &inputs.light_name;
         let size = inputs.camera.size();
         let [across, down] = tile_counts(size);
         let sizes = self.sizes;
-        let mut penumbra = part_list_for_two(graph, inputs, "penumbra");
+        let mut groups = Groups::create(graph, inputs);
         let mut open = part_list(graph, inputs, "open");
         let mut plain = part_list(graph, inputs, "plain");
         let mut sorted = part_list(graph, inputs, "sorted");
@@ -150,7 +153,7 @@ impl Making {
         let used = graph.create_buffer(format!("{NAME}.used {name}"), sixteen);
         let further = graph.create_buffer(format!("{NAME}.further {name}"), sixteen);
         let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
-        penumbra.clear(&mut pass);
+        groups.leading.clear(&mut pass);
         open.clear(&mut pass);
         plain.clear(&mut pass);
         sorted.clear(&mut pass);
@@ -164,8 +167,8 @@ impl Making {
         let none = [0u32, 1, 1, 0];
         let of_blocks = [0, 1, sizes.blocks, 0];
         let arguments = [
-            (penumbra.arguments, 0, none),
-            (penumbra.arguments, OTHER_DISPATCH, none),
+            (groups.leading.arguments, 0, none),
+            (groups.leading.arguments, OTHER_DISPATCH, none),
             (open.arguments, 0, none),
             (plain.arguments, 0, none),
             (sorted.arguments, 0, none),
@@ -183,34 +186,22 @@ impl Making {
             Ok(())
         });
 
+        groups.add(graph, inputs, self.params, self.shafts, made.estimates);
         let format = vk::Format::R32G32B32A32_UINT;
         let pool = texels(format, sizes.chunks() * CHUNK_TEXELS);
         let pool = graph.create_image(format!("{NAME}.pool {name}"), pool);
-        let format = vk::Format::R32G32B32A32_UINT;
         let desc = ImageDesc::new(format, across * LIST_TEXELS, down * PARTS);
-        let lists = graph.create_image(format!("{NAME}.lists {name}"), desc);
+        let lists = graph.create_image(format!("{NAME}.group_lists {name}"), desc);
         let mut listed = Listed {
-            penumbra,
+            groups,
             used,
             pool,
             lists,
-            estimates: made.estimates,
         };
-        self.add_lists(graph, inputs, rest, &mut listed, None);
-        let again = self.add_overflow(graph, inputs, rest, &mut listed);
-        self.add_lists(graph, inputs, rest, &mut listed, Some(again));
-        let Listed {
-            penumbra,
-            used,
-            pool,
-            lists,
-            estimates,
-        } = listed;
-        let candidates = Candidates {
-            tiles: penumbra,
-            lists,
-            pool,
-            used,
+        self.add_lists(graph, inputs, &mut listed, None);
+        let again = self.add_overflow(graph, inputs, &mut listed);
+        self.add_lists(graph, inputs, &mut listed, Some(again));
+        let kinds = Kinds {
             further,
             partial,
             walk_rest,
@@ -218,21 +209,23 @@ impl Making {
             open,
             sorted: [plain, sorted],
         };
-        (candidates, Made { estimates, ..made })
+        (listed, kinds)
     }
 
-    /// Declares the pass that lists candidates, or lists them again with the same room for all tiles: by the given
+    /// Declares the pass that lists candidates, or lists them again with the same room for all groups: by the given
     /// arguments.
     fn add_lists(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        rest: TileList,
         made: &mut Listed,
         again: Option<BufferId>,
     ) {
         let name = &inputs.light_name;
-        let (params, shafts) = (self.params, self.shafts);
+        let params = self.params;
+        let Groups {
+            leading, shafts, ..
+        } = made.groups;
         let (hierarchy, triangles) = (inputs.ids.hierarchy, inputs.ids.triangles);
         let (view_params, part) = inputs.view_params;
         let shape = shape_number(&inputs.light.shape);
@@ -243,24 +236,17 @@ impl Making {
         for image in [hierarchy, triangles, shafts] {
             pass.read(image, Access::StorageRead(Stage::Compute));
         }
-        rest.read(&mut pass);
+        leading.read(&mut pass);
         let written = Access::StorageWrite(Stage::Compute);
         if let Some(again) = again {
             pass.read(again, Access::Indirect);
-            made.penumbra.arguments = pass.write(
-                made.penumbra.arguments,
-                Access::StorageReadWrite(Stage::Compute),
-            );
-            made.penumbra.tiles = pass.write(made.penumbra.tiles, written);
             made.pool = pass.write(made.pool, written);
             made.lists = pass.write(made.lists, written);
         } else {
-            made.penumbra.fill(&mut pass);
             made.pool = pass.overwrite(made.pool, written);
             made.lists = pass.overwrite(made.lists, written);
         }
         made.used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
-        made.estimates = pass.write(made.estimates, written);
         let made = *made;
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();
@@ -268,23 +254,23 @@ impl Making {
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
                 Bind::storage_image(2, hierarchy),
-                Bind::uniform(3, rest.arguments),
-                Bind::sampled(4, rest.tiles, nearest),
+                Bind::uniform(3, leading.arguments),
+                Bind::sampled(4, leading.tiles, nearest),
                 Bind::storage_image(5, shafts),
                 Bind::storage_image(6, triangles),
-                Bind::storage_buffer(7, made.penumbra.arguments),
-                Bind::storage_image(8, made.penumbra.tiles),
                 Bind::storage_buffer(9, made.used),
                 Bind::storage_image(10, made.pool),
                 Bind::storage_image(11, made.lists),
-                Bind::storage_image(12, made.estimates),
             ];
             let pipeline = ComputePipelineDesc {
                 constants: vec![(0, shape), (1, u32::from(again.is_some()))],
                 ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_LISTS_COMP)
             };
             ctx.bind_compute(&pipeline, &bindings, &[])?;
-            ctx.dispatch_indirect(again.unwrap_or(rest.arguments), 0)
+            match again {
+                Some(again) => ctx.dispatch_indirect(again, 0),
+                None => made.groups.dispatch_invocations(ctx),
+            }
         });
     }
 
@@ -293,15 +279,15 @@ impl Making {
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        rest: TileList,
         made: &mut Listed,
     ) -> BufferId {
         let name = &inputs.light_name;
         let params = self.params;
+        let groups = made.groups.leading.arguments;
         let again = BufferDesc { size: 16 };
         let again = graph.create_buffer(format!("{NAME}.overflow {name}"), again);
         let mut pass = graph.pass(format!("{NAME}.overflow {name}"), PassKind::Compute);
-        for buffer in [params, rest.arguments] {
+        for buffer in [params, groups] {
             pass.read(buffer, Access::Uniform(Stage::Compute));
         }
         made.used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
@@ -310,7 +296,7 @@ impl Making {
         pass.record(move |ctx| {
             let bindings = [
                 Bind::uniform(0, params),
-                Bind::uniform(1, rest.arguments),
+                Bind::uniform(1, groups),
                 Bind::storage_buffer(2, used),
                 Bind::storage_buffer(3, again),
             ];
@@ -322,27 +308,26 @@ impl Making {
         again
     }
 
-    /// Declares the pass that makes entries for the masks from candidates; returns what it makes with them, and the
-    /// images of edges and triangles.
+    /// Declares the pass that makes entries of groups from their candidates.
     fn add_entries(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        candidates: Candidates,
-    ) -> (Candidates, [ImageId; 2]) {
+        listed: &mut Listed,
+    ) -> GroupEntries {
         let name = &inputs.light_name;
-        let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
-        let Candidates {
-            tiles,
-            lists,
+        let (sizes, params) = (self.sizes, self.params);
+        let Listed {
+            groups:
+                Groups {
+                    leading: tiles,
+                    shafts,
+                    ..
+                },
             pool,
-            used,
             ..
-        } = candidates;
-        let edges = texels(vk::Format::R32_UINT, sizes.edge_rows * POOL_WIDTH);
-        let edges = graph.create_image(format!("{NAME}.edges {name}"), edges);
-        let triangles = texels(vk::Format::R32_UINT, sizes.pool_rows * POOL_WIDTH);
-        let triangles = graph.create_image(format!("{NAME}.triangles {name}"), triangles);
+        } = *listed;
+        let (edges, triangles) = create_entries(graph, "group_", name, &sizes);
         let ids = inputs.ids;
         let (view_params, part) = inputs.view_params;
         let shape = shape_number(&inputs.light.shape);
@@ -353,8 +338,8 @@ impl Making {
             pass.read(image, Access::StorageRead(Stage::Compute));
         }
         tiles.read(&mut pass);
-        let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
-        let used = pass.write(used, Access::StorageReadWrite(Stage::Compute));
+        let lists = pass.write(listed.lists, Access::StorageReadWrite(Stage::Compute));
+        let used = pass.write(listed.used, Access::StorageReadWrite(Stage::Compute));
         let edges = pass.overwrite(edges, Access::StorageWrite(Stage::Compute));
         let triangles = pass.overwrite(triangles, Access::StorageWrite(Stage::Compute));
         pass.record(move |ctx| {
@@ -380,12 +365,8 @@ impl Making {
             ctx.bind_compute(&pipeline, &bindings, &[])?;
             tiles.dispatch(ctx)
         });
-        let candidates = Candidates {
-            lists,
-            used,
-            ..candidates
-        };
-        (candidates, [edges, triangles])
+        (listed.lists, listed.used) = (lists, used);
+        GroupEntries { edges, triangles }
     }
 
     /// Declares the pass that settles tiles by their entries, and lists the others.
@@ -393,23 +374,32 @@ impl Making {
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
-        candidates: Candidates,
-        [edges, triangles]: [ImageId; 2],
+        (tiles, listed, group_entries): (TileList, Listed, GroupEntries),
+        kinds: Kinds,
         made: Made,
     ) -> (Lists, Made) {
         let name = &inputs.light_name;
         let (sizes, params, shafts) = (self.sizes, self.params, self.shafts);
-        let Candidates {
-            tiles,
-            lists,
+        let Kinds {
             further,
             mut partial,
             walk_rest,
             mut pieces,
             mut open,
             sorted: [plain, mut others],
-            ..
-        } = candidates;
+        } = kinds;
+        let (edges, triangles) = create_entries(graph, "", name, &sizes);
+        let [across, down] = tile_counts(inputs.camera.size());
+        let format = vk::Format::R32G32B32A32_UINT;
+        let lists = ImageDesc::new(format, across * LIST_TEXELS, down * PARTS);
+        let lists = graph.create_image(format!("{NAME}.lists {name}"), lists);
+        let (leaders, groups) = (listed.groups.leaders, listed.groups.leading.arguments);
+        let of_groups = [
+            leaders,
+            listed.lists,
+            group_entries.edges,
+            group_entries.triangles,
+        ];
         let tasks = sizes.pool_rows * POOL_WIDTH / sizes.task_entries;
         let tasks = texels(vk::Format::R32G32B32A32_UINT, tasks);
         let tasks = graph.create_image(format!("{NAME}.tasks {name}"), tasks);
@@ -419,7 +409,11 @@ impl Making {
         let mut pass = graph.pass(format!("{NAME}.classes {name}"), PassKind::Compute);
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
-        for image in [scene_triangles, shafts, view_depth, edges] {
+        pass.read(groups, Access::Uniform(Stage::Compute));
+        for image in [scene_triangles, shafts, view_depth] {
+            pass.read(image, Access::StorageRead(Stage::Compute));
+        }
+        for image in of_groups {
             pass.read(image, Access::StorageRead(Stage::Compute));
         }
         tiles.read(&mut pass);
@@ -431,7 +425,9 @@ impl Making {
             arguments: pass.write(plain.arguments, Access::StorageReadWrite(Stage::Compute)),
             tiles: others.tiles,
         };
-        let lists = pass.write(lists, Access::StorageReadWrite(Stage::Compute));
+        let lists = pass.overwrite(lists, Access::StorageWrite(Stage::Compute));
+        let edges = pass.overwrite(edges, Access::StorageWrite(Stage::Compute));
+        let triangles = pass.overwrite(triangles, Access::StorageWrite(Stage::Compute));
         let further = pass.write(further, Access::StorageReadWrite(Stage::Compute));
         let tasks = pass.overwrite(tasks, Access::StorageWrite(Stage::Compute));
         let visibility = pass.write(made.visibility, Access::StorageWrite(Stage::Compute));
@@ -461,13 +457,19 @@ impl Making {
                 Bind::storage_buffer(19, plain.arguments),
                 Bind::storage_buffer(20, others.arguments),
                 Bind::storage_image(21, others.tiles),
+                Bind::storage_image(22, triangles),
+                Bind::storage_image(23, of_groups[0]),
+                Bind::uniform(24, groups),
+                Bind::storage_image(25, of_groups[1]),
+                Bind::storage_image(26, of_groups[2]),
+                Bind::storage_image(27, of_groups[3]),
             ];
             let pipeline = ComputePipelineDesc {
                 constants: vec![(0, shape), (4, sizes.task_entries)],
                 ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_CLASSES_COMP)
             };
             ctx.bind_compute(&pipeline, &bindings, &[])?;
-            ctx.dispatch_indirect(tiles.arguments, OTHER_DISPATCH)
+            tiles.dispatch(ctx)
         });
         let lists = Lists {
             tiles: open,
@@ -488,4 +490,19 @@ impl Making {
         };
         (lists, made)
     }
+}
+
+/// Images of edges and of triangles, both R32_UINT.
+fn create_entries(
+    graph: &mut Graph<'_>,
+    of: &str,
+    name: &str,
+    sizes: &Sizes,
+) -> (ImageId, ImageId) {
+    let edges = texels(vk::Format::R32_UINT, sizes.edge_rows * POOL_WIDTH);
+    let triangles = texels(vk::Format::R32_UINT, sizes.pool_rows * POOL_WIDTH);
+    (
+        graph.create_image(format!("{NAME}.{of}edges {name}"), edges),
+        graph.create_image(format!("{NAME}.{of}triangles {name}"), triangles),
+    )
 }

@@ -17,10 +17,11 @@
 //! | `start`, `tiles` | the picture's tiles that some of the light is above |
 //! | `shafts`, `shafts_rough` | the tiles, in two parts where they span a gap in depth; their shafts, and boxes around their surfaces |
 //! | `no_rest`, `settle` | lit and dark tiles settled, as far as a short walk tells |
-//! | `lists` | more lit tiles settled; candidates of the others |
+//! | `groups` | the others, in groups of up to four beside each other |
+//! | `lists` | candidates of each group |
 //! | `overflow`, `lists.again` | the same with equal room for all, where they had too little |
-//! | `entries` | edges and triangles for the masks |
-//! | `classes` | more lit tiles and dark ones settled; the others listed by kind |
+//! | `entries` | edges and triangles of each group |
+//! | `classes` | those that matter to each tile; more lit tiles and dark ones settled; the others listed by kind |
 //! | `masks_pieces` | what the beginnings of long lists hide, or each block of more than 64 samples |
 //! | `masks`, `masks_plain` | visibility of the others |
 //! | `further` | what the rest of long lists hides |
@@ -33,6 +34,7 @@
 //! | `no_bound`, `bound` | a bound on the error, if anything reads it |
 
 mod bound;
+mod groups;
 mod lists;
 mod masks;
 mod options;

@@ -216,7 +216,8 @@ void main() {
     vec3 p = view.camera.eye.xyz + depth * ray;
     MaskReceiver receiver = MaskReceiver(p + way_into_triangle(p, id), id, true);
     LightFrom light = light_from(view.light, receiver.position);
-    Projection projection = projection_from(receiver, 0.0);
+    Axes axes = axes_from(receiver.position, false);
+    Projection projection = projection_from(axes, receiver.position);
     vec3 normal = fetch_geometric_normal(max(id, 1u) - 1u);
     vec3 above = line_of_plane(light, normal);
     // Nothing is known of a tile whose list is not whole, nor of suns so wide that rows have no widest chord.
@@ -238,13 +239,13 @@ void main() {
             uint corner = code & ((1u << EDGE_CORNER_BITS) - 1u);
             vec3 a = fetch_triangle_texel(4u * triangle + corner).xyz;
             vec3 b = fetch_triangle_texel(4u * triangle + (corner == 2u ? 0u : corner + 1u)).xyz;
-            cells |= cells_of_edge(project(projection, a), project(projection, b));
+            cells |= cells_of_edge(project(projection, along_axes(axes, a)), project(projection, along_axes(axes, b)));
         }
         for (uint i = 0u; i < entries.whole; ++i) {
             uint triangle = imageLoad(triangle_pool, triangle_texel_place(entries.first + i)).x;
-            vec2 a = project(projection, fetch_triangle_texel(4u * triangle).xyz);
-            vec2 b = project(projection, fetch_triangle_texel(4u * triangle + 1u).xyz);
-            vec2 c = project(projection, fetch_triangle_texel(4u * triangle + 2u).xyz);
+            vec2 a = project(projection, along_axes(axes, fetch_triangle_texel(4u * triangle).xyz));
+            vec2 b = project(projection, along_axes(axes, fetch_triangle_texel(4u * triangle + 1u).xyz));
+            vec2 c = project(projection, along_axes(axes, fetch_triangle_texel(4u * triangle + 2u).xyz));
             cells |= cells_of_edge(a, b) | cells_of_edge(b, c) | cells_of_edge(c, a);
         }
         for (uint i = 0u; i < entries.others; ++i) {

@@ -101,9 +101,9 @@ vec4 fetch_footprint(ivec2 place) {
 }
 
 // What an edge from a to b adds to the number of triangles between a receiver and the middle of the light.
-int edge_rounds(Projection projection, uint code, vec3 from, vec3 to) {
-    vec2 a = project(projection, from);
-    vec2 b = project(projection, to);
+int edge_rounds(Axes axes, Projection projection, uint code, vec3 from, vec3 to) {
+    vec2 a = project(projection, along_axes(axes, from));
+    vec2 b = project(projection, along_axes(axes, to));
     Side side = side_between(a, b);
     bool before = side.low.y <= 0.0 && 0.0 < side.high && side.low.x - side.low.y * side.slope < 0.0;
     bool ends = (a.y < b.y) == (((code & EDGE_TURNED) != 0u) == projection.turned);
@@ -165,7 +165,8 @@ void main() {
     uint edge_room = params.pattern.z / arguments.count;
     uint first_edge = index * edge_room;
     bool one_axis = rows_have_one_axis(view.light, surfaces);
-    Projection projection = projection_from(MaskReceiver(some, 0u, true), 0.0);
+    Axes axes = axes_from(some, false);
+    Projection projection = projection_from(axes, some);
     uint edges = 0u;
     bool any_meets = false;
     int rounds = 0;
@@ -184,7 +185,7 @@ void main() {
             }
             edges += 1u;
             any_meets = any_meets || meets;
-            rounds += edge_rounds(projection, code, a, b);
+            rounds += edge_rounds(axes, projection, code, a, b);
         }
         i += 1u;
     } while (i < group_end);
@@ -201,10 +202,7 @@ void main() {
         uint place = i < second.x ? first.z + i : first.z + first.w - 1u - (i - second.x);
         uint triangle = i < group_end ? imageLoad(group_triangles, triangle_texel_place(place)).x : 0u;
         Triangle t = fetch_triangle(triangle);
-        uint side = triangle_side(surfaces, t.corners[0], t.plane.xyz);
-        uint side_of_light = light_side(surfaces, view.light, frame, t.corners[0], t.plane.xyz);
-        if (i < group_end && shaft_meets_triangle(shaft, t.corners[0], t.corners[1], t.corners[2])
-            && !hides_nothing(surfaces, side, side_of_light, t.corners[0], t.corners[1], t.corners[2])) {
+        if (i < group_end && shaft_meets_triangle(shaft, t.corners[0], t.corners[1], t.corners[2])) {
             if (whole + others < room) {
                 uint at_triangle = first_triangle + (i < second.x ? whole : room - 1u - others);
                 imageStore(triangle_pool, triangle_texel_place(at_triangle), uvec4(triangle));

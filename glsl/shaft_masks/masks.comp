@@ -160,14 +160,16 @@ void add_blocker(MaskReceiver receivers[4], LightFrom lights[4], uint block, Blo
 }
 
 // What counted triangles hide where digits have no room for their number.
-uvec2 counted_again(Projection projection, uint first, uint edges) {
+uvec2 counted_again(vec3 position, uint first, uint edges) {
+    Axes axes = axes_from(position, true);
+    Projection projection = projection_from(axes, position);
     uint halves[HALVES * ROWS];
     for (uint i = 0u; i < HALVES * ROWS; ++i) {
         halves[i] = NO_HALVES;
     }
     for (uint i = 0u; i < edges; ++i) {
         uint code = imageLoad(edge_pool, triangle_texel_place(first + i)).x;
-        count_edge_in_halves(projection, fetch_edge_begin(code), fetch_edge_end(code), code, halves);
+        count_edge_in_halves(projection, along_axes(axes, fetch_edge_begin(code)), along_axes(axes, fetch_edge_end(code)), code, halves);
     }
     return counted_mask_of_halves(halves);
 }
@@ -225,11 +227,12 @@ void main() {
     in_pieces = WORDS != 0u && in_pieces;
 
     bool is_spilled = false;
+    Axes axes = axes_from(receivers[0].position, true);
     Projection from[4];
     uint digits[4][ROWS];
     int sums[4];
     [[unroll]] for (uint i = 0u; i < 4u; ++i) {
-        from[i] = projection_from(receivers[i], row_rise());
+        from[i] = projection_from(axes, receivers[i].position);
         sums[i] = 0;
         for (uint r = 0u; r < ROWS; ++r) {
             digits[i][r] = NO_DIGITS;
@@ -243,8 +246,8 @@ void main() {
     do {
         if (at_edge < edges && SPILLED == 0u) {
             uint code = imageLoad(edge_pool, triangle_texel_place(entries.first_edge + at_edge)).x;
-            vec3 a = fetch_edge_begin(code);
-            vec3 b = fetch_edge_end(code);
+            vec3 a = along_axes(axes, fetch_edge_begin(code));
+            vec3 b = along_axes(axes, fetch_edge_end(code));
             [[unroll]] for (uint i = 0u; i < 4u; ++i) {
                 count_edge(from[i], a, b, code, digits[i], sums[i]);
             }
@@ -262,8 +265,7 @@ void main() {
         [[unroll]] for (uint i = 1u; i < 4u; ++i) {
             position = i == at ? receivers[i].position : position;
         }
-        Projection again = projection_from(MaskReceiver(position, 0u, true), row_rise());
-        uvec2 mask = counted_again(again, entries.first_edge, edges);
+        uvec2 mask = counted_again(position, entries.first_edge, edges);
         [[unroll]] for (uint i = 0u; i < 4u; ++i) {
             blocked[i] |= i == at ? mask : uvec2(0u);
         }
@@ -274,9 +276,9 @@ void main() {
     do {
         if (at_whole < end) {
             uint triangle = imageLoad(triangle_pool, triangle_texel_place(entries.first + at_whole)).x;
-            vec3 a = fetch_triangle_texel(4u * triangle).xyz;
-            vec3 b = fetch_triangle_texel(4u * triangle + 1u).xyz;
-            vec3 c = fetch_triangle_texel(4u * triangle + 2u).xyz;
+            vec3 a = along_axes(axes, fetch_triangle_texel(4u * triangle).xyz);
+            vec3 b = along_axes(axes, fetch_triangle_texel(4u * triangle + 1u).xyz);
+            vec3 c = along_axes(axes, fetch_triangle_texel(4u * triangle + 2u).xyz);
             [[unroll]] for (uint i = 0u; i < 4u; ++i) {
                 add_whole(from[i], a, b, c, blocked[i]);
             }

@@ -19,6 +19,8 @@ layout(constant_id = 3) const uint MASKED = 0u;
 // 1 for tiles with no triangles but whole ones, whose surfaces have all of the light above them: a pipeline of its own,
 // because a driver without branches goes through what it does for others.
 layout(constant_id = 2) const uint PLAIN = 0u;
+// 1 for a sun of at most 5.7 degrees, where the square of the tangent of half of that is at most 0.0025.
+layout(constant_id = 8) const uint SMALL_SUN = 0u;
 
 // The light as a receiver sees it: its samples are center + u x + v y, from the receiver.
 struct LightFrom {
@@ -94,17 +96,25 @@ void fetch_light_rows(uint block) {
 const float TO_INTEGER = 12582912.0;
 const int TO_INTEGER_BITS = 0x4b400000;
 
-// Four times the number of a row's samples that lie before the place, 0 to 32: rounded from above 4 n - 2, so that
+// Four times the number of a row's samples that lie before a place, 0 to 32: rounded from above 4 n - 2, so that
 // the sample at a whole column plus 0.5 is the next one's neighbour.
-uint quads_before(uint r, float place) {
-    vec2 row = light_quads[r];
-    float quad = row.x * place + row.y;
-    if (LIGHT_SHAPE == LIGHT_SUN) {
-        quad = row.x * (place * inversesqrt(light_rows[r].w + place * place * SUN_TANGENT_SQUARE)) + row.y;
-    }
+uint whole_quads(float quad) {
     // Floats of one sign are in the order of their bits.
     precise float shifted = quad + TO_INTEGER;
     return uint(clamp(floatBitsToInt(shifted), TO_INTEGER_BITS, TO_INTEGER_BITS + 33)) & 60u;
+}
+
+uint quads_before(uint r, float place) {
+    vec2 row = light_quads[r];
+    if (LIGHT_SHAPE == LIGHT_SUN && SMALL_SUN != 0u) {
+        // The root's series. What comes after it adds less than a unit of the last place to places near the sun, and the
+        // sum is never far from 1 or below it where the place is far out.
+        float more = (light_rows[r].w - 1.0) + place * place * SUN_TANGENT_SQUARE;
+        return whole_quads(row.x * (place * (1.0 + more * (0.375 * more - 0.5))) + row.y);
+    } else if (LIGHT_SHAPE == LIGHT_SUN) {
+        return whole_quads(row.x * (place * inversesqrt(light_rows[r].w + place * place * SUN_TANGENT_SQUARE)) + row.y);
+    }
+    return whole_quads(row.x * place + row.y);
 }
 
 // Number of a row's samples that lie before the place, 0 to 8.
@@ -112,36 +122,68 @@ uint columns_before(uint r, float place) {
     return quads_before(r, place) >> 2;
 }
 
-// What projects points onto the plane of the samples, as coordinates on the light.
-struct Projection {
-    vec3 from;
+// Axes that points are taken along before they are projected, from a base. But for a sphere they are the same for all
+// receivers, so that this is done once for several.
+struct Axes {
+    vec3 base;
     vec3 x;
     vec3 y;
-    vec3 z; // the plane is at 1, the receiver at 0
-    vec2 middle;
-    bool turned; // for the receiver y is clockwise of x
+    vec3 z; // across the plane of the samples
 };
 
-// rise: row_rise() for coordinates in which rows are level, 0 for those of the light.
-Projection projection_from(MaskReceiver receiver, float rise) {
-    LightFrom light = light_from(view.light, receiver.position);
-    vec3 across = cross(light.x, light.y);
-    float height = dot(across, light.center);
+// in_rows: for coordinates in which rows are level and, of a rectangle, four times a column wide; else those of the light.
+Axes axes_from(vec3 base, bool in_rows) {
+    LightFrom light = light_from(view.light, base);
+    vec3 x = light.x / max(dot(light.x, light.x), 1.0e-37);
+    vec3 y = light.y / max(dot(light.y, light.y), 1.0e-37) - (in_rows ? row_rise() : 0.0) * x;
+    float columns = in_rows && LIGHT_SHAPE == LIGHT_RECT ? 4.0 * params.rows[0].y : 1.0;
+    return Axes(base, columns * x, y, cross(light.x, light.y));
+}
+
+// A point along the axes; of a sphere's, which turn with the receiver, only from the base.
+vec3 along_axes(Axes axes, vec3 p) {
+    precise vec3 offset = p - axes.base;
+    if (LIGHT_SHAPE == LIGHT_SPHERE) {
+        return offset;
+    }
+    precise vec3 along = vec3(dot(offset, axes.x), dot(offset, axes.y), dot(offset, axes.z));
+    return along;
+}
+
+// What projects points onto the plane of the samples, as coordinates on the light.
+struct Projection {
+    vec3 from; // the receiver, along the axes
+    Axes own;  // of a sphere
+    vec2 middle;
+    float height; // of the plane over the receiver, along the third axis
+    bool turned;  // for the receiver y is clockwise of x
+};
+
+Projection projection_from(Axes axes, vec3 position) {
     Projection projection;
-    projection.from = receiver.position;
-    projection.x = light.x / max(dot(light.x, light.x), 1.0e-37);
-    projection.y = light.y / max(dot(light.y, light.y), 1.0e-37) - rise * projection.x;
-    projection.z = across / (abs(height) < 1.0e-37 ? 1.0e-37 : height);
-    projection.middle = vec2(dot(projection.x, light.center), dot(projection.y, light.center));
+    projection.from = along_axes(axes, position);
+    projection.own = LIGHT_SHAPE == LIGHT_SPHERE ? axes_from(position, true) : axes;
+    vec3 center = light_offset(view.light, position);
+    if (LIGHT_SHAPE == LIGHT_SPHERE) {
+        center = light_from(view.light, position).center;
+    }
+    float height = dot(projection.own.z, center);
+    projection.middle = vec2(dot(projection.own.x, center), dot(projection.own.y, center));
+    projection.height = abs(height) < 1.0e-37 ? 1.0e-37 : height;
     projection.turned = height > 0.0;
     return projection;
 }
 
-vec2 project(Projection projection, vec3 p) {
-    precise vec3 offset = p - projection.from;
-    precise vec2 place = vec2(dot(offset, projection.x), dot(offset, projection.y));
-    precise float inverse = 1.0 / dot(offset, projection.z);
-    precise vec2 result = place * inverse - projection.middle;
+// point: along the axes.
+vec2 project(Projection projection, vec3 point) {
+    precise vec3 offset = point - projection.from;
+    if (LIGHT_SHAPE == LIGHT_SPHERE) {
+        precise vec3 along = vec3(dot(offset, projection.own.x), dot(offset, projection.own.y),
+            dot(offset, projection.own.z));
+        offset = along;
+    }
+    precise float scale = projection.height / offset.z;
+    precise vec2 result = offset.xy * scale - projection.middle;
     return result;
 }
 
@@ -160,7 +202,7 @@ Side side_between(vec2 a, vec2 b) {
 // Four times the number of a row's samples before the edge; of no meaning in rows that it does not cross.
 uint quads_before_side(uint r, Side side) {
     precise float place = (light_rows[r].x - side.low.y) * side.slope + side.low.x;
-    return quads_before(r, place);
+    return LIGHT_SHAPE == LIGHT_RECT ? whole_quads(place + light_quads[r].y) : quads_before(r, place);
 }
 
 uint columns_before_side(uint r, Side side) {
@@ -347,10 +389,6 @@ const uint LINES = 4u;
 const float FAR_ALONG = 1.0e6;
 
 uvec2 mask_of_lines(vec3 lines[LINES], bool last_counts) {
-    if (LIGHT_SHAPE == LIGHT_LINE) {
-        uvec2 within = mask_of_line(lines[0]) & mask_of_line(lines[1]) & mask_of_line(lines[2]);
-        return within & (last_counts ? mask_of_line(lines[3]) : uvec2(0xffffffffu));
-    }
     Crossing crossings[LINES];
     for (uint i = 0u; i < LINES; ++i) {
         crossings[i] = crossing_of_line(lines[i]);
@@ -364,6 +402,16 @@ uvec2 mask_of_lines(vec3 lines[LINES], bool last_counts) {
         ends[i].zw = counts && crossings[i].before ? line : vec2(0.0, FAR_ALONG);
     }
     uvec2 within = uvec2(0u);
+    if (LIGHT_SHAPE == LIGHT_LINE) {
+        // All rows are one.
+        float first = -FAR_ALONG;
+        float end = FAR_ALONG;
+        for (uint i = 0u; i < LINES; ++i) {
+            first = ends[i].y > first ? ends[i].y : first;
+            end = ends[i].w < end ? ends[i].w : end;
+        }
+        return line_mask_from(first) & ~line_mask_from(end);
+    }
     for (uint r = 0u; r < ROWS; ++r) {
         float first = -FAR_ALONG;
         float end = FAR_ALONG;

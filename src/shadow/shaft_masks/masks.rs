@@ -1,6 +1,6 @@
 //! The passes that work on the lists.
 
-use super::{Lists, Made, NAME, OTHER_DISPATCH, PARTS, Sizes, texels};
+use super::{Lists, Made, NAME, OTHER_DISPATCH, PARTS, Sizes, samples, texels};
 use crate::geometry::{TILE_SIZE, TileList};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageId, PassKind, Stage};
@@ -179,6 +179,7 @@ impl Masks {
                 7,
                 u32::from(!matches!(step, Step::Plain(_) | Step::Others(_))),
             ),
+            (8, u32::from(samples::is_small_sun(&inputs.light.shape))),
         ];
         let dispatched = match step {
             Step::Pieces => OTHER_DISPATCH,

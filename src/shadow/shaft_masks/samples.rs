@@ -73,6 +73,12 @@ fn tangent(shape: &LightShape) -> f64 {
     }
 }
 
+/// Whether the light is a sun for which `SMALL_SUN` in `shaft_masks/masks.glsl` may be set: of the root
+/// 1 / sqrt(1 + e) the part after the second power of e is below 1e-7, for e is at most 2.7 times this square near the sun.
+pub(super) fn is_small_sun(shape: &LightShape) -> bool {
+    matches!(shape, LightShape::Sun { .. }) && tangent(shape).powi(2) <= 0.0025
+}
+
 /// `side` rows of `side` samples.
 pub(super) fn rows(shape: &LightShape, side: u32) -> Vec<Row> {
     let count = f64::from(side);

@@ -1,7 +1,7 @@
 //! Walks of pixels, for tiles whose triangles are on no list.
 
 use super::masks::Masks;
-use super::{Lists, NAME, PARTS, Sizes, texels};
+use super::{Lists, NAME, PARTS, Sizes, samples, texels};
 use crate::geometry::tile_counts;
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{Access, Bind, BufferDesc, BufferId, Graph, ImageId, PassKind, Stage};
@@ -139,6 +139,7 @@ impl Masks {
             (0, shape_number(&inputs.light.shape)),
             (1, u32::from(is_rest)),
             (3, u32::from(inputs.scene.has_masks())),
+            (8, u32::from(samples::is_small_sun(&inputs.light.shape))),
         ];
         pass.record(move |ctx| {
             let nearest = SamplerDesc::nearest();

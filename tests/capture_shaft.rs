@@ -311,6 +311,9 @@ fn lists_without_room_change_nothing() {
         "shaft-masks:samples=64,target-error=none,room=12",
     ];
     same("figure.glb", &techniques);
+    // Tiles with more triangles than there is room for, but fewer than a task has.
+    let room = "shaft-masks:samples=64,target-error=none,room=16";
+    same("fences.gltf", &[techniques[0], room, techniques[2]]);
     // Tens of thousands of triangles in a shaft, cut out by their texture.
     same("foliage.glb", &techniques[..2]);
 }

@@ -62,8 +62,9 @@ layout(set = 0, binding = 20, std430) buffer OtherArguments {
 };
 layout(set = 0, binding = 21, r32ui) uniform writeonly uimage2D sorted_list;
 layout(set = 0, binding = 22, r32ui) uniform writeonly uimage2D triangle_pool;
-// Of groups: which part leads that of each part, how many there are, and what lists and entries they have.
-layout(set = 0, binding = 23, r32ui) uniform readonly uimage2D leaders;
+// Of groups: which part leads that of each part (not as a storage image, of which some devices take 16), how many there
+// are, and what lists and entries they have.
+layout(set = 0, binding = 23) uniform usampler2D leaders;
 layout(set = 0, binding = 24, std140) uniform GroupArguments {
     TileArguments groups;
 };
@@ -145,7 +146,7 @@ void main() {
     uint entry = texelFetch(list, tile_entry_place(index, tiles), 0).x;
     uvec2 part = part_of_entry(entry, tiles);
     uvec2 tile = tile_of_part(part, tiles);
-    uint leading = imageLoad(leaders, ivec2(part)).x;
+    uint leading = texelFetch(leaders, ivec2(part), 0).x;
     ivec2 at = list_place(part_of_entry(leading, tiles));
     uvec4 candidates = imageLoad(group_lists, at);
     uvec4 first = imageLoad(group_lists, at + ivec2(1, 0));

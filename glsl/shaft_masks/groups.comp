@@ -6,6 +6,7 @@
 #include "common/tiles.glsl"
 #include "common/view_params.glsl"
 #include "shaft_masks/estimates.glsl"
+#include "shaft_masks/lists.glsl"
 #include "shaft_masks/sides.glsl"
 
 layout(local_size_x = PARTS_A_GROUP) in;
@@ -23,8 +24,7 @@ layout(set = 0, binding = 4, rgba32f) uniform writeonly image2D shafts;
 // Of each part that which leads its group.
 layout(set = 0, binding = 5, r32ui) uniform writeonly uimage2D leaders;
 layout(set = 0, binding = 6, std430) buffer GroupArguments {
-    TileArguments groups; // a workgroup each
-    TileArguments groups_of_groups; // an invocation each
+    TileArguments groups;
 };
 layout(set = 0, binding = 7, r32ui) uniform writeonly uimage2D group_list;
 
@@ -45,8 +45,6 @@ vec4 fetch_shaft_texel(ivec2 place) {
     return imageLoad(part_shafts, place);
 }
 
-// Tiles of a cell across and down.
-const uvec2 CELL = uvec2(2u, 2u);
 // A box around surfaces of several tiles may be as many times as wide as the widest of theirs.
 const float MOST_WIDER = 3.0;
 
@@ -70,11 +68,6 @@ mat3 directions(vec3 axes[3]) {
         frame[i] = normalize(axes[i] / (scale > 0.0 ? scale : 1.0));
     }
     return known ? frame : mat3(1.0);
-}
-
-uvec2 part_of_member(uvec2 cell, uint member, uint level, uvec2 tiles) {
-    uvec2 tile = cell * CELL + uvec2(member % CELL.x, member / CELL.x);
-    return uvec2(tile.x, tile.y + level * tiles.y);
 }
 
 // Stores the shaft of the first of these parts with the others that go with it; returns the parts that are left.
@@ -153,13 +146,12 @@ uint add_group(uvec2 cell, uint level, uvec2 tiles, uint members) {
         planes[6] = one_plane ? below
             : plane_below(view.light, light_reach, base, turned ? -box_frame[2] : box_frame[2],
                 turned ? -own_high.z : own_low.z, slack);
-        store_planes(place, planes, vec4(shaft.low.xyz, above ? 1.0 : 0.0), shaft.high);
+        store_planes(place, planes, vec4(shaft.low.xyz, above ? 1.0 : 0.0),
+            vec4(shaft.high.xyz, float(members & ~left)));
         store_normals(place, normal_low, normal_high, some);
     }
     uint slot = atomicAdd(groups.count, 1u);
-    atomicMax(groups.groups_x, min(slot + 1u, TILE_ROW));
-    atomicMax(groups.groups_y, slot / TILE_ROW + 1u);
-    atomicMax(groups_of_groups.groups_x, slot / PARTS_A_GROUP + 1u);
+    atomicMax(groups.groups_x, slot / PARTS_A_GROUP + 1u);
     imageStore(group_list, tile_entry_place(slot, tiles), uvec4(leading));
     return left;
 }

@@ -69,6 +69,15 @@ const uint EDGE_TURNED = 0x80000000u;
 // Most that edges of one tile may count in sum.
 const uint MOST_COUNT = 2048u;
 
+// Tiles of a cell across and down: those of a group are within one.
+const uvec2 CELL = uvec2(2u, 2u);
+
+// A tile of a cell, or a part of one.
+uvec2 part_of_member(uvec2 cell, uint member, uint level, uvec2 tiles) {
+    uvec2 tile = cell * CELL + uvec2(member % CELL.x, member / CELL.x);
+    return uvec2(tile.x, tile.y + level * tiles.y);
+}
+
 // Triangles of a tile that are looked at as ones that may cover all of the light: two texels.
 const uint MOST_COVERS = 8u;
 

@@ -223,7 +223,7 @@ void main() {
         receivers[i] = fetch_receiver(pixels[i], depths, blocked[i]);
     }
     bool in_pieces = params.pattern.y > 1u || entries.whole + entries.others > TASK_ENTRIES
-        || stored.z < params.counts.z;
+        || stored.z < params.counts.z || stored.w == TILE_WALKED;
     in_pieces = WORDS != 0u && in_pieces;
 
     bool is_spilled = false;

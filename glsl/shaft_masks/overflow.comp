@@ -23,6 +23,6 @@ layout(set = 0, binding = 3, std430) writeonly buffer AgainArguments {
 
 void main() {
     bool over = chunks_used > params.counts.w;
-    again = uvec4(over ? arguments.groups_x : 0u, 1u, 1u, 0u);
+    again = uvec4(over ? (arguments.count + PARTS_A_GROUP - 1u) / PARTS_A_GROUP : 0u, 1u, 1u, 0u);
     chunks_used = over ? 0u : chunks_used;
 }

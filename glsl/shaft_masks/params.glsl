@@ -12,6 +12,9 @@ const float ROW_SINE = 0.38268343236;
 const uint MOST_ROWS = 32u;
 const uint MOST_BLOCKS = 16u; // of 8 rows of 8
 
+// Invocations of a workgroup where each takes a tile, a part of one, or a group of them.
+const uint PARTS_A_GROUP = 64u;
+
 struct ShaftParams {
     uvec4 counts;  // width and height of the picture in pixels, nodes, chunks of the pool of candidates
     // Blocks of samples along an axis, all blocks, edges that their pool has room for, level: 64 * 4^(level - 1) samples.

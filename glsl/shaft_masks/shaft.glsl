@@ -14,9 +14,6 @@ const uint SHAFT_PLANES = 7u;
 // Texels of a tile's shaft, side by side: planes, box, box of its surfaces, space between, normals.
 const uint SHAFT_TEXELS = SHAFT_PLANES + 10u;
 
-// Invocations of a workgroup where each takes a tile or a part of one.
-const uint PARTS_A_GROUP = 64u;
-
 // Rounding of positions, as a part of the largest coordinate: a few units of the last place. What is
 // nearer to a surface than that does not block its light.
 const float POSITION_ROUNDING = 1.0 / 2097152.0;
@@ -24,7 +21,7 @@ const float POSITION_ROUNDING = 1.0 / 2097152.0;
 struct Shaft {
     vec4 planes[SHAFT_PLANES];
     vec4 low;  // xyz: of the box; w: 1 where all of the light is above all surfaces' planes, -1 where none of it is
-    vec4 high; // xyz: of the box
+    vec4 high; // xyz: of the box; w: of a group with several members which of its cell they are, as bits of an integer
 };
 
 vec4 fetch_shaft_texel(ivec2 place); // defined by the entry file

@@ -1,17 +1,23 @@
 //! The pass that finds groups of tiles for which what is between them and the light is found once.
 
-use super::{NAME, OTHER_DISPATCH, PARTS, SHAFT_TEXELS, part_list_for_two};
+use super::{NAME, PARTS, SHAFT_TEXELS, part_list};
 use crate::geometry::{TileList, tile_counts};
-use crate::gpu::{ComputePipelineDesc, spirv};
-use crate::graph::{Access, Bind, BufferId, Graph, ImageDesc, ImageId, PassKind, Stage};
+use crate::gpu::{ComputePipelineDesc, GpuError, spirv};
+use crate::graph::{
+    Access, Bind, BufferId, Graph, ImageDesc, ImageId, PassBuilder, PassContext, PassKind, Stage,
+};
 use crate::shadow::{ShadowInputs, shape_number};
 use ash::vk;
 
 /// Groups of tiles beside each other, or of parts of tiles: each led by one of them.
 #[derive(Clone, Copy)]
 pub(super) struct Groups {
-    /// The parts that lead one. The other dispatch takes an invocation each.
+    /// The parts that lead one, an invocation each.
     pub leading: TileList,
+    /// Those of groups that were taken apart, an invocation each.
+    pub singles: TileList,
+    /// The parts that lead a group in the end, a workgroup each.
+    pub listed: TileList,
     /// R32_UINT, a texel a part: which leads its group.
     pub leaders: ImageId,
     /// As the parts' own shafts, at the places of those that lead.
@@ -28,18 +34,26 @@ impl Groups {
         let format = vk::Format::R32G32B32A32_SFLOAT;
         let shafts = ImageDesc::new(format, across * SHAFT_TEXELS, down);
         Self {
-            leading: part_list_for_two(graph, inputs, "groups"),
+            leading: part_list(graph, inputs, "groups"),
+            singles: part_list(graph, inputs, "singles"),
+            listed: part_list(graph, inputs, "listed"),
             leaders: graph.create_image(format!("{NAME}.leaders {name}"), leaders),
             shafts: graph.create_image(format!("{NAME}.group_shafts {name}"), shafts),
         }
     }
 
-    /// Dispatches the bound pipeline with an invocation a group.
-    pub(super) fn dispatch_invocations(
-        &self,
-        ctx: &mut crate::graph::PassContext<'_>,
-    ) -> Result<(), crate::gpu::GpuError> {
-        ctx.dispatch_indirect(self.leading.arguments, OTHER_DISPATCH)
+    /// Declares that a transfer pass clears the lists; [`Groups::record_clear`] does it.
+    pub(super) fn clear(&mut self, pass: &mut PassBuilder<'_, '_>) {
+        for list in [&mut self.leading, &mut self.singles, &mut self.listed] {
+            list.clear(pass);
+        }
+    }
+
+    /// Clears the arguments of the lists to those of no work.
+    pub(super) fn record_clear(&self, ctx: &mut PassContext<'_>) -> Result<(), GpuError> {
+        [self.leading, self.singles, self.listed]
+            .iter()
+            .try_for_each(|list| list.record_clear(ctx))
     }
 
     /// Declares the pass that groups the parts that the estimates say are open.
@@ -90,5 +104,5 @@ impl Groups {
     }
 }
 
-/// Tiles of a cell across and down: `CELL` in `shaft_masks/groups.comp`.
+/// Tiles of a cell across and down: `CELL` in `shaft_masks/lists.glsl`.
 const CELL: u32 = 2;

@@ -23,6 +23,17 @@ pub(super) struct Making {
     pub estimates: ImageId,
 }
 
+/// What a pass lists candidates of.
+#[derive(Clone, Copy)]
+enum Walk {
+    /// Groups, which it takes apart where they have many.
+    Groups,
+    /// The tiles of groups that were taken apart, a group each.
+    Singles,
+    /// All of them again, with the same room for each, by these arguments.
+    Again(BufferId),
+}
+
 /// What the passes that list candidates write, and the pass after them completes.
 #[derive(Clone, Copy)]
 struct Listed {
@@ -153,7 +164,7 @@ impl Making {
         let used = graph.create_buffer(format!("{NAME}.used {name}"), sixteen);
         let further = graph.create_buffer(format!("{NAME}.further {name}"), sixteen);
         let mut pass = graph.pass(format!("{NAME}.clear {name}"), PassKind::Transfer);
-        groups.leading.clear(&mut pass);
+        groups.clear(&mut pass);
         open.clear(&mut pass);
         plain.clear(&mut pass);
         sorted.clear(&mut pass);
@@ -167,8 +178,6 @@ impl Making {
         let none = [0u32, 1, 1, 0];
         let of_blocks = [0, 1, sizes.blocks, 0];
         let arguments = [
-            (groups.leading.arguments, 0, none),
-            (groups.leading.arguments, OTHER_DISPATCH, none),
             (open.arguments, 0, none),
             (plain.arguments, 0, none),
             (sorted.arguments, 0, none),
@@ -179,7 +188,9 @@ impl Making {
             (pieces.arguments, OTHER_DISPATCH, of_blocks),
             (used, 0, [0; 4]),
         ];
+        let cleared = groups;
         pass.record(move |ctx| {
+            cleared.record_clear(ctx)?;
             for (buffer, offset, values) in arguments {
                 ctx.update_buffer(buffer, offset, bytemuck::cast_slice(&values))?;
             }
@@ -198,9 +209,10 @@ impl Making {
             pool,
             lists,
         };
-        self.add_lists(graph, inputs, &mut listed, None);
+        self.add_lists(graph, inputs, &mut listed, Walk::Groups);
+        self.add_lists(graph, inputs, &mut listed, Walk::Singles);
         let again = self.add_overflow(graph, inputs, &mut listed);
-        self.add_lists(graph, inputs, &mut listed, Some(again));
+        self.add_lists(graph, inputs, &mut listed, Walk::Again(again));
         let kinds = Kinds {
             further,
             partial,
@@ -212,40 +224,65 @@ impl Making {
         (listed, kinds)
     }
 
-    /// Declares the pass that lists candidates, or lists them again with the same room for all groups: by the given
-    /// arguments.
+    /// Declares a pass that lists candidates.
     fn add_lists(
         &self,
         graph: &mut Graph<'_>,
         inputs: &ShadowInputs<'_>,
         made: &mut Listed,
-        again: Option<BufferId>,
+        walk: Walk,
     ) {
         let name = &inputs.light_name;
-        let params = self.params;
-        let Groups {
-            leading, shafts, ..
-        } = made.groups;
+        let (params, part_shafts) = (self.params, self.shafts);
         let (hierarchy, triangles) = (inputs.ids.hierarchy, inputs.ids.triangles);
         let (view_params, part) = inputs.view_params;
         let shape = shape_number(&inputs.light.shape);
-        let suffix = again.map_or("", |_| ".again");
+        let suffix = match walk {
+            Walk::Groups => "",
+            Walk::Singles => ".singles",
+            Walk::Again(_) => ".again",
+        };
         let mut pass = graph.pass(format!("{NAME}.lists{suffix} {name}"), PassKind::Compute);
         pass.read_part(view_params, part, Access::Uniform(Stage::Compute));
         pass.read(params, Access::Uniform(Stage::Compute));
-        for image in [hierarchy, triangles, shafts] {
+        for image in [hierarchy, triangles, part_shafts] {
             pass.read(image, Access::StorageRead(Stage::Compute));
         }
-        leading.read(&mut pass);
+        let groups = &mut made.groups;
         let written = Access::StorageWrite(Stage::Compute);
-        if let Some(again) = again {
-            pass.read(again, Access::Indirect);
-            made.pool = pass.write(made.pool, written);
-            made.lists = pass.write(made.lists, written);
-        } else {
-            made.pool = pass.overwrite(made.pool, written);
-            made.lists = pass.overwrite(made.lists, written);
+        // The shader may write to all lists but its own, for all that is known of it: where it does not, one that is no
+        // longer needed is bound.
+        let (tiles, listed, singles, arguments);
+        match walk {
+            Walk::Groups => {
+                tiles = groups.leading;
+                groups.listed.fill(&mut pass);
+                groups.singles.fill(&mut pass);
+                (listed, singles, arguments) = (groups.listed, groups.singles, tiles.arguments);
+                made.pool = pass.overwrite(made.pool, written);
+                made.lists = pass.overwrite(made.lists, written);
+            }
+            Walk::Singles => {
+                tiles = groups.singles;
+                groups.listed.extend(&mut pass);
+                groups.leading.extend(&mut pass);
+                (listed, singles, arguments) = (groups.listed, groups.leading, tiles.arguments);
+                made.pool = pass.write(made.pool, written);
+                made.lists = pass.write(made.lists, written);
+            }
+            Walk::Again(again) => {
+                pass.read(again, Access::Indirect);
+                tiles = groups.listed;
+                groups.leading.extend(&mut pass);
+                groups.singles.extend(&mut pass);
+                (listed, singles, arguments) = (groups.leading, groups.singles, again);
+                made.pool = pass.write(made.pool, written);
+                made.lists = pass.write(made.lists, written);
+            }
         }
+        tiles.read(&mut pass);
+        groups.leaders = pass.write(groups.leaders, written);
+        groups.shafts = pass.write(groups.shafts, Access::StorageReadWrite(Stage::Compute));
         made.used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));
         let made = *made;
         pass.record(move |ctx| {
@@ -254,23 +291,31 @@ impl Making {
                 Bind::uniform(0, view_params).part(part),
                 Bind::uniform(1, params),
                 Bind::storage_image(2, hierarchy),
-                Bind::uniform(3, leading.arguments),
-                Bind::sampled(4, leading.tiles, nearest),
-                Bind::storage_image(5, shafts),
+                Bind::uniform(3, tiles.arguments),
+                Bind::sampled(4, tiles.tiles, nearest),
+                Bind::storage_image(5, made.groups.shafts),
                 Bind::storage_image(6, triangles),
+                Bind::storage_buffer(7, listed.arguments),
+                Bind::storage_image(8, listed.tiles),
                 Bind::storage_buffer(9, made.used),
                 Bind::storage_image(10, made.pool),
                 Bind::storage_image(11, made.lists),
+                Bind::storage_buffer(12, singles.arguments),
+                Bind::storage_image(13, singles.tiles),
+                Bind::storage_image(14, made.groups.leaders),
+                Bind::storage_image(15, part_shafts),
+            ];
+            let constants = vec![
+                (0, shape),
+                (1, u32::from(matches!(walk, Walk::Again(_)))),
+                (2, u32::from(matches!(walk, Walk::Groups))),
             ];
             let pipeline = ComputePipelineDesc {
-                constants: vec![(0, shape), (1, u32::from(again.is_some()))],
+                constants,
                 ..ComputePipelineDesc::new(&spirv::SHAFT_MASKS_LISTS_COMP)
             };
             ctx.bind_compute(&pipeline, &bindings, &[])?;
-            match again {
-                Some(again) => ctx.dispatch_indirect(again, 0),
-                None => made.groups.dispatch_invocations(ctx),
-            }
+            ctx.dispatch_indirect(arguments, 0)
         });
     }
 
@@ -283,7 +328,7 @@ impl Making {
     ) -> BufferId {
         let name = &inputs.light_name;
         let params = self.params;
-        let groups = made.groups.leading.arguments;
+        let groups = made.groups.listed.arguments;
         let again = BufferDesc { size: 16 };
         let again = graph.create_buffer(format!("{NAME}.overflow {name}"), again);
         let mut pass = graph.pass(format!("{NAME}.overflow {name}"), PassKind::Compute);
@@ -320,7 +365,7 @@ impl Making {
         let Listed {
             groups:
                 Groups {
-                    leading: tiles,
+                    listed: tiles,
                     shafts,
                     ..
                 },
@@ -393,13 +438,8 @@ impl Making {
         let format = vk::Format::R32G32B32A32_UINT;
         let lists = ImageDesc::new(format, across * LIST_TEXELS, down * PARTS);
         let lists = graph.create_image(format!("{NAME}.lists {name}"), lists);
-        let (leaders, groups) = (listed.groups.leaders, listed.groups.leading.arguments);
-        let of_groups = [
-            leaders,
-            listed.lists,
-            group_entries.edges,
-            group_entries.triangles,
-        ];
+        let (leaders, groups) = (listed.groups.leaders, listed.groups.listed.arguments);
+        let of_groups = [listed.lists, group_entries.edges, group_entries.triangles];
         let tasks = sizes.pool_rows * POOL_WIDTH / sizes.task_entries;
         let tasks = texels(vk::Format::R32G32B32A32_UINT, tasks);
         let tasks = graph.create_image(format!("{NAME}.tasks {name}"), tasks);
@@ -416,6 +456,7 @@ impl Making {
         for image in of_groups {
             pass.read(image, Access::StorageRead(Stage::Compute));
         }
+        pass.read(leaders, Access::Sampled(Stage::Compute));
         tiles.read(&mut pass);
         partial.fill(&mut pass);
         pieces.fill(&mut pass);
@@ -458,11 +499,11 @@ impl Making {
                 Bind::storage_buffer(20, others.arguments),
                 Bind::storage_image(21, others.tiles),
                 Bind::storage_image(22, triangles),
-                Bind::storage_image(23, of_groups[0]),
+                Bind::sampled(23, leaders, nearest),
                 Bind::uniform(24, groups),
-                Bind::storage_image(25, of_groups[1]),
-                Bind::storage_image(26, of_groups[2]),
-                Bind::storage_image(27, of_groups[3]),
+                Bind::storage_image(25, of_groups[0]),
+                Bind::storage_image(26, of_groups[1]),
+                Bind::storage_image(27, of_groups[2]),
             ];
             let pipeline = ComputePipelineDesc {
                 constants: vec![(0, shape), (4, sizes.task_entries)],

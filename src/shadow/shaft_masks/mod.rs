@@ -18,7 +18,7 @@
 //! | `shafts`, `shafts_rough` | the tiles, in two parts where they span a gap in depth; their shafts, and boxes around their surfaces |
 //! | `no_rest`, `settle` | lit and dark tiles settled, as far as a short walk tells |
 //! | `groups` | the others, in groups of up to four beside each other |
-//! | `lists` | candidates of each group |
+//! | `lists`, `lists.singles` | candidates of each group, or of each of its tiles where they have many |
 //! | `overflow`, `lists.again` | the same with equal room for all, where they had too little |
 //! | `entries` | edges and triangles of each group |
 //! | `classes` | those that matter to each tile; more lit tiles and dark ones settled; the others listed by kind |

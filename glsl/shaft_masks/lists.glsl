@@ -66,7 +66,7 @@ const uint EDGE_CORNER_BITS = 2u;
 const uint EDGE_DOUBLE = 0x40000000u;
 const uint EDGE_TURNED = 0x80000000u;
 
-// Most that edges of one tile may count in sum.
+// Most that edges of a group may count in sum.
 const uint MOST_COUNT = 2048u;
 
 // Tiles of a cell across and down: those of a group are within one.

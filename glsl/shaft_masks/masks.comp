@@ -169,7 +169,9 @@ uvec2 counted_again(vec3 position, uint first, uint edges) {
     }
     for (uint i = 0u; i < edges; ++i) {
         uint code = imageLoad(edge_pool, triangle_texel_place(first + i)).x;
-        count_edge_in_halves(projection, along_axes(axes, fetch_edge_begin(code)), along_axes(axes, fetch_edge_end(code)), code, halves);
+        vec3 a = along_axes(axes, fetch_edge_begin(code));
+        vec3 b = along_axes(axes, fetch_edge_end(code));
+        count_edge_in_halves(projection, a, b, code, halves);
     }
     return counted_mask_of_halves(halves);
 }

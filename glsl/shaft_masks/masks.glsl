@@ -107,8 +107,8 @@ uint whole_quads(float quad) {
 uint quads_before(uint r, float place) {
     vec2 row = light_quads[r];
     if (LIGHT_SHAPE == LIGHT_SUN && SMALL_SUN != 0u) {
-        // The root's series. What comes after it adds less than a unit of the last place to places near the sun, and the
-        // sum is never far from 1 or below it where the place is far out.
+        // The root's series to its second power: near the sun the rest is less than rounding. The factor is at least 5/6
+        // everywhere, so that what is far out stays out.
         float more = (light_rows[r].w - 1.0) + place * place * SUN_TANGENT_SQUARE;
         return whole_quads(row.x * (place * (1.0 + more * (0.375 * more - 0.5))) + row.y);
     } else if (LIGHT_SHAPE == LIGHT_SUN) {
@@ -122,8 +122,8 @@ uint columns_before(uint r, float place) {
     return quads_before(r, place) >> 2;
 }
 
-// Axes that points are taken along before they are projected, from a base. But for a sphere they are the same for all
-// receivers, so that this is done once for several.
+// Axes that points are taken along before they are projected, from a base. They are the same for all receivers, so that
+// this is done once for several; only those of a sphere turn with the receiver.
 struct Axes {
     vec3 base;
     vec3 x;

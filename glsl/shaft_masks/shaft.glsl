@@ -64,11 +64,6 @@ Shaft fetch_shaft(uvec2 part) {
     return shaft;
 }
 
-// w of its shaft's low: 1 where all of the light is above all surfaces' planes, -1 where none of it is.
-float fetch_shaft_above(uvec2 part) {
-    return fetch_shaft_texel(ivec2(part.x * SHAFT_TEXELS + SHAFT_PLANES, part.y)).w;
-}
-
 // Where a box lies to a shaft.
 const uint BOX_OUTSIDE = 0u;
 const uint BOX_MEETS = 1u;

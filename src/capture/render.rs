@@ -350,7 +350,7 @@ struct ReadBacks {
     sources: Vec<(Source, u64)>,
     dumps: Vec<Dump>,
     /// Of each light, and the place of its image among the sources.
-    tallies: Vec<Option<(Tally, usize)>>,
+    tallies: Vec<Vec<(Tally, usize)>>,
     /// Number of sources before those of the dumps.
     fixed: usize,
     /// Size of the buffer.
@@ -382,19 +382,21 @@ impl ReadBacks {
         let mut tallies = Vec::new();
         for mask in &frame.masks {
             // A limit that was asked for is told by the counters too.
-            let tally = mask
-                .tally
-                .filter(|_| is_counted || request.technique.has_limit());
-            let desc = tally.and_then(|tally| graph.image_desc(tally.image));
-            tallies.push(tally.zip(desc).map(|(tally, desc)| {
-                sources.push(Source {
-                    width: desc.width,
-                    height: desc.height,
-                    layers: desc.layers,
-                    ..picture(tally.image, 4)
-                });
-                (tally, sources.len() - 1)
-            }));
+            let wanted = is_counted || request.technique.has_limit();
+            let made = [mask.tally, mask.settled].into_iter().flatten();
+            let mut own = Vec::new();
+            for tally in made.filter(|_| wanted) {
+                if let Some(desc) = graph.image_desc(tally.image) {
+                    own.push((tally, sources.len()));
+                    sources.push(Source {
+                        width: desc.width,
+                        height: desc.height,
+                        layers: desc.layers,
+                        ..picture(tally.image, 4)
+                    });
+                }
+            }
+            tallies.push(own);
         }
         let fixed = sources.len();
         sources.extend(dumps.iter().flat_map(|dump| dump.sources.iter().copied()));
@@ -466,9 +468,9 @@ impl ReadBacks {
         let lights = lights.map(|(at, ((light, range), choice))| {
             let passes = plan.passes.iter();
             let own = passes.filter(|pass| range.contains(&pass.declared));
-            let tally = self.tallies.get(at).copied().flatten();
-            let counts = tally.map(|(tally, at)| (tally.count)(&self.take::<u32>(at, bytes)));
-            let counts = counts.into_iter().flatten();
+            let tallies = self.tallies.get(at).into_iter().flatten();
+            let counts =
+                tallies.flat_map(|(tally, at)| (tally.count)(&self.take::<u32>(*at, bytes)));
             CapturedLight {
                 counters: counts.map(|(name, n)| (name.to_string(), n)).collect(),
                 light: *light,

@@ -78,6 +78,8 @@ pub struct ShadowMask {
     pub silhouettes: Option<Silhouettes>,
     /// What can be counted of the work, if anything.
     pub tally: Option<Tally>,
+    /// How many tiles were settled beforehand, where the technique left them out.
+    pub settled: Option<Tally>,
 }
 
 /// Counts that are made on the host from an image.
@@ -99,6 +101,7 @@ impl ShadowMask {
             error_bound: None,
             silhouettes: None,
             tally: None,
+            settled: None,
         }
     }
 }

@@ -71,6 +71,28 @@ impl TechniqueOption {
     }
 }
 
+/// The value of an option that is on or off; `None` for another text.
+pub(super) fn switch(value: &str) -> Option<bool> {
+    match value {
+        "on" => Some(true),
+        "off" => Some(false),
+        _ => None,
+    }
+}
+
+/// As [`switch`] reads it.
+pub(super) fn switched(value: bool) -> String {
+    if value { "on" } else { "off" }.to_string()
+}
+
+/// The option that leaves tiles out which are told to see all of the light or nothing of it.
+pub(super) const CLASSES: TechniqueOption = TechniqueOption::new(
+    "classes",
+    "off",
+    "off or on (by the triangles between a tile and the light, as `shaft-masks` does)",
+    "whether tiles that see all of the light or nothing of it are left out",
+);
+
 /// Why a text names no technique.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

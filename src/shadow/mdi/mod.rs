@@ -76,10 +76,8 @@ fn add_visibility<'f>(
 ) -> ShadowMask {
     let name = &inputs.light_name;
     let light = inputs.light;
-    let mut receivers = add_receivers(graph, inputs, NAME, light.shape.reach());
-    if classes {
-        receivers = add_classes(graph, inputs, NAME, &receivers);
-    }
+    let receivers = add_receivers(graph, inputs, NAME, light.shape.reach());
+    let (receivers, settled) = add_classes(graph, inputs, NAME, receivers, classes);
     let list = receivers.list;
     let gbuffer = inputs.gbuffer;
     let layers = *layers;
@@ -129,6 +127,7 @@ fn add_visibility<'f>(
             image: tally,
             count,
         }),
+        settled,
         ..ShadowMask::new(visibility)
     }
 }

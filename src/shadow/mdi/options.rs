@@ -1,6 +1,7 @@
 //! Options of `mdi`.
 
 use crate::shadow::TechniqueOption;
+use crate::shadow::technique::{CLASSES, switch, switched};
 
 /// How buckets lie in the casters' depth range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,14 +56,6 @@ pub struct MdiOptions {
     /// Tiles of the picture that see all of the light or nothing of it are told from the triangles
     /// between them and the light, and no ray of theirs is traced.
     pub classes: bool,
-}
-
-fn switch(value: &str) -> Option<bool> {
-    match value {
-        "on" => Some(true),
-        "off" => Some(false),
-        _ => None,
-    }
 }
 
 /// Texels across a usual penumbra below which finer ones are worth their time.
@@ -143,12 +136,7 @@ impl MdiOptions {
             "on or off",
             "whether boundaries that block no ray of a pixel are ruled out before any is traced",
         ),
-        TechniqueOption::new(
-            "classes",
-            "off",
-            "off or on (by the triangles between a tile and the light, as `shaft-masks` does)",
-            "whether tiles that see all of the light or nothing of it are left out of tracing",
-        ),
+        CLASSES,
     ];
 
     /// The values, in the order of [`ALL`](Self::ALL).
@@ -172,9 +160,9 @@ impl MdiOptions {
             .to_string(),
             if self.dithered { "dithered" } else { "nearest" }.to_string(),
             self.depths.to_string(),
-            if self.sides { "on" } else { "off" }.to_string(),
-            if self.early { "on" } else { "off" }.to_string(),
-            if self.classes { "on" } else { "off" }.to_string(),
+            switched(self.sides),
+            switched(self.early),
+            switched(self.classes),
         ]
     }
 

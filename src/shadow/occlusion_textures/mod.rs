@@ -35,6 +35,7 @@ use between::Casters;
 pub use options::{Combine, Filter, Fit, OcclusionOptions, Planes, Projection};
 
 use super::receivers::add_receivers;
+use super::shaft_masks::add_classes;
 use super::unblocked::add_unblocked;
 use super::{ShadowInputs, ShadowMask, Tally};
 use crate::graph::Graph;
@@ -76,6 +77,8 @@ pub(super) fn add_passes<'f>(
         sliced.push((slices, filtered));
     }
     let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.reach());
+    let classes = options.classes && !options.count_fetches;
+    let (receivers, settled) = add_classes(graph, inputs, NAME, receivers, classes);
     let mut mask = receivers.visibility;
     for (index, (slices, filtered)) in sliced.iter().enumerate() {
         mask = visibility::add_visibility(
@@ -92,6 +95,7 @@ pub(super) fn add_passes<'f>(
             image: counts,
             count: slices::tell,
         }),
+        settled,
         ..ShadowMask::new(mask)
     }
 }

@@ -1,6 +1,7 @@
 //! Options of `occlusion-textures`.
 
 use crate::shadow::TechniqueOption;
+use crate::shadow::technique::{CLASSES, switch, switched};
 
 /// How boxes of an occlusion texture are averaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,6 +98,9 @@ pub struct OcclusionOptions {
     pub contact: u32,
     /// Leave out textures that hold nothing, or add nothing, within a kernel.
     pub early: bool,
+    /// Tiles of the picture that see all of the light or nothing of it are told from the triangles
+    /// between them and the light, and left out; not with `count_fetches`.
+    pub classes: bool,
     /// Make an image of the work instead: texture accesses of filters at each pixel, in 1024ths.
     pub count_fetches: bool,
 }
@@ -115,6 +119,7 @@ impl OcclusionOptions {
         middle: true,
         contact: 8,
         early: true,
+        classes: false,
         count_fetches: false,
     };
 
@@ -182,6 +187,7 @@ impl OcclusionOptions {
             "on or off",
             "whether textures that can add nothing to a pixel are left out",
         ),
+        CLASSES,
         TechniqueOption::new(
             "show",
             "visibility",
@@ -233,7 +239,8 @@ impl OcclusionOptions {
                 .map_or("auto".to_string(), |texels| texels.to_string()),
             if self.middle { "middle" } else { "lower" }.to_string(),
             self.contact.to_string(),
-            if self.early { "on" } else { "off" }.to_string(),
+            switched(self.early),
+            switched(self.classes),
             if self.count_fetches {
                 "fetches"
             } else {
@@ -307,13 +314,8 @@ impl OcclusionOptions {
                 }
             }
             "contact" => self.contact = number(0..=64)?,
-            "early" => {
-                self.early = match value {
-                    "on" => true,
-                    "off" => false,
-                    _ => return None,
-                }
-            }
+            "early" => self.early = switch(value)?,
+            "classes" => self.classes = switch(value)?,
             "show" => {
                 self.count_fetches = match value {
                     "visibility" => false,

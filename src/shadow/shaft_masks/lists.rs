@@ -252,35 +252,31 @@ impl Making {
         let written = Access::StorageWrite(Stage::Compute);
         // The shader may write to all lists but its own, for all that is known of it: where it does not, one that is no
         // longer needed is bound.
-        let (tiles, listed, singles, arguments);
-        match walk {
-            Walk::Groups => {
-                tiles = groups.leading;
-                groups.listed.fill(&mut pass);
-                groups.singles.fill(&mut pass);
-                (listed, singles, arguments) = (groups.listed, groups.singles, tiles.arguments);
-                made.pool = pass.overwrite(made.pool, written);
-                made.lists = pass.overwrite(made.lists, written);
-            }
-            Walk::Singles => {
-                tiles = groups.singles;
-                groups.listed.extend(&mut pass);
-                groups.leading.extend(&mut pass);
-                (listed, singles, arguments) = (groups.listed, groups.leading, tiles.arguments);
-                made.pool = pass.write(made.pool, written);
-                made.lists = pass.write(made.lists, written);
-            }
+        let (tiles, listed, singles) = match walk {
+            Walk::Groups => (groups.leading, &mut groups.listed, &mut groups.singles),
+            Walk::Singles => (groups.singles, &mut groups.listed, &mut groups.leading),
+            Walk::Again(_) => (groups.listed, &mut groups.leading, &mut groups.singles),
+        };
+        let arguments = match walk {
+            Walk::Groups | Walk::Singles => tiles.arguments,
             Walk::Again(again) => {
                 pass.read(again, Access::Indirect);
-                tiles = groups.listed;
-                groups.leading.extend(&mut pass);
-                groups.singles.extend(&mut pass);
-                (listed, singles, arguments) = (groups.leading, groups.singles, again);
-                made.pool = pass.write(made.pool, written);
-                made.lists = pass.write(made.lists, written);
+                again
             }
-        }
+        };
         tiles.read(&mut pass);
+        if matches!(walk, Walk::Groups) {
+            listed.fill(&mut pass);
+            singles.fill(&mut pass);
+            made.pool = pass.overwrite(made.pool, written);
+            made.lists = pass.overwrite(made.lists, written);
+        } else {
+            listed.extend(&mut pass);
+            singles.extend(&mut pass);
+            made.pool = pass.write(made.pool, written);
+            made.lists = pass.write(made.lists, written);
+        }
+        let (listed, singles) = (*listed, *singles);
         groups.leaders = pass.write(groups.leaders, written);
         groups.shafts = pass.write(groups.shafts, Access::StorageReadWrite(Stage::Compute));
         made.used = pass.write(made.used, Access::StorageReadWrite(Stage::Compute));

@@ -48,7 +48,7 @@ pub use samples::light_samples;
 
 use super::receivers::{Receivers, add_receivers};
 use super::uniform::add_uniform;
-use super::{ShadowInputs, ShadowMask, shape_number};
+use super::{ShadowInputs, ShadowMask, Tally, shape_number};
 use crate::geometry::{TILE_SIZE, TileList, tile_counts};
 use crate::gpu::{ComputePipelineDesc, SamplerDesc, spirv};
 use crate::graph::{
@@ -214,18 +214,23 @@ pub(super) fn add_passes<'f>(
 }
 
 /// Declares the passes that settle, for another technique, the tiles that see all of the light or
-/// nothing of it, from the pixels' centres; the others stay on the list.
+/// nothing of it, from the pixels' centres; the others stay on the list. Returns how many there are of each, too. Without
+/// `classes` nothing is declared, and all tiles stay.
 pub(super) fn add_classes(
     graph: &mut Graph<'_>,
     inputs: &ShadowInputs<'_>,
     technique: &str,
-    receivers: &Receivers,
-) -> Receivers {
+    receivers: Receivers,
+    classes: bool,
+) -> (Receivers, Option<Tally>) {
+    if !classes {
+        return (receivers, None);
+    }
     let [across, down] = tile_counts(inputs.camera.size());
     let options = ShaftOptions::DEFAULT;
     let sizes = Sizes::new(across * down, &options, inputs.scene.has_masks());
     let params = add_params(graph, inputs, &sizes, options.side, "params");
-    let (shafts, parts) = add_shafts(graph, inputs, (technique, 1), params, receivers);
+    let (shafts, parts) = add_shafts(graph, inputs, (technique, 1), params, &receivers);
     let making = lists::Making {
         params,
         shafts,
@@ -233,10 +238,11 @@ pub(super) fn add_classes(
         estimates: refine::no_estimates(graph, inputs),
     };
     let (lists, made) = making.add(graph, inputs, parts, receivers.visibility);
-    Receivers {
+    let receivers = Receivers {
         list: lists.tiles,
         visibility: made.visibility,
-    }
+    };
+    (receivers, Some(refine::tile_tally(made.estimates)))
 }
 
 /// Declares the uniform buffer of masks of `side` rows of samples.

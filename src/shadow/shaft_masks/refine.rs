@@ -83,14 +83,36 @@ pub(super) fn tally(estimates: ImageId) -> Tally {
     Tally { image, count }
 }
 
+/// Of these the counts of tiles, where no masks are made.
+pub(super) fn tile_tally(estimates: ImageId) -> Tally {
+    let image = estimates;
+    Tally {
+        image,
+        count: count_tiles,
+    }
+}
+
 /// `LEVEL_LIT` and `LEVEL_DARK` in `shaft_masks/estimates.glsl`.
 const LEVEL_LIT: u32 = 0x100;
 const LEVEL_DARK: u32 = 0x101;
 
+fn tiles_at(texels: &[u32], level: u32) -> u64 {
+    let tiles = texels.chunks_exact(ESTIMATE_TEXELS as usize);
+    tiles.filter(|tile| tile[2] == level).count() as u64
+}
+
+fn count_tiles(texels: &[u32]) -> Vec<(&'static str, u64)> {
+    let of = |level: u32| tiles_at(texels, level);
+    let [few, more, most] = [1, 2, 3].map(of);
+    vec![
+        ("tiles_lit", of(LEVEL_LIT)),
+        ("tiles_umbra", of(LEVEL_DARK)),
+        ("tiles_penumbra", few + more + most),
+    ]
+}
+
 fn count(texels: &[u32]) -> Vec<(&'static str, u64)> {
     let tiles = || texels.chunks_exact(ESTIMATE_TEXELS as usize);
-    let of = |level: u32| tiles().filter(|tile| tile[2] == level).count() as u64;
-    let [few, more, most] = [1, 2, 3].map(of);
     let penumbra = || tiles().filter(|tile| (1..=3).contains(&tile[2]));
     let squares = penumbra().map(|tile| {
         let samples = f64::from(BLOCK * BLOCK) * 4.0_f64.powi(tile[2] as i32 - 1);
@@ -98,19 +120,18 @@ fn count(texels: &[u32]) -> Vec<(&'static str, u64)> {
     });
     let pixels: u32 = penumbra().map(|tile| tile[0] >> 20).sum();
     let error = (squares.sum::<f64>() / f64::from(pixels.max(1))).sqrt();
-    vec![
-        ("tiles_lit", of(LEVEL_LIT)),
-        ("tiles_umbra", of(LEVEL_DARK)),
-        ("tiles_penumbra", few + more + most),
-        ("tiles_256", more),
-        ("tiles_1024", most),
+    let mut counts = count_tiles(texels);
+    counts.extend([
+        ("tiles_256", tiles_at(texels, 2)),
+        ("tiles_1024", tiles_at(texels, 3)),
         (
             "tile_entries",
             penumbra().map(|tile| u64::from(tile[3])).sum(),
         ),
         ("estimated_error_millionths", (1.0e6 * error).round() as u64),
         (BOUND, penumbra().map(bound_parts).max().unwrap_or(0)),
-    ]
+    ]);
+    counts
 }
 
 /// The counter of the largest bound: a number of cells, of 1024.

@@ -43,6 +43,7 @@ use super::light_view::{LightView, MAX_LIGHT_VIEWS, light_views, note_left_out};
 use super::map::{ShadowMap, add_maps_of};
 use super::pcss::nearest_blocker;
 use super::receivers::add_receivers;
+use super::shaft_masks::add_classes;
 use super::silhouettes::{
     NO_EDGES, SilhouetteRule, Silhouettes, add_blank, add_silhouettes, edge_count, skip_edges,
 };
@@ -165,7 +166,7 @@ pub(super) fn add_passes<'f>(
     if let Some(reason) = needless {
         let blank = add_no_bands(graph, inputs, &options, layers, reason);
         let bands = (blank, blank);
-        return ShadowMask::new(add_visibility(graph, inputs, &options, buffer, map, bands));
+        return add_visibility(graph, inputs, &options, buffer, map, bands);
     }
     let list = add_silhouettes(graph, inputs, NAME, SilhouetteRule::Center, VERTICES);
     let outlines = add_outlines(graph, inputs, layers, buffer, map, list);
@@ -179,11 +180,11 @@ pub(super) fn add_passes<'f>(
     let bands = drawing.add_maps(graph, inputs, None);
     let second = (options.layers > 1).then(|| drawing.add_maps(graph, inputs, Some(bands)));
     let bands = (bands, second.unwrap_or(bands));
-    let visibility = add_visibility(graph, inputs, &options, buffer, map, bands);
+    let mask = add_visibility(graph, inputs, &options, buffer, map, bands);
     ShadowMask {
         silhouettes: Some(list),
         tally: Some(drawing.add_counts(graph, inputs)),
-        ..ShadowMask::new(visibility)
+        ..mask
     }
 }
 
@@ -377,9 +378,10 @@ fn add_visibility<'f>(
     params: BufferId,
     (map_depth, map_ids): (ImageId, ImageId),
     (bands, second): (ImageId, ImageId),
-) -> ImageId {
+) -> ShadowMask {
     let name = &inputs.light_name;
     let receivers = add_receivers(graph, inputs, NAME, inputs.light.shape.reach());
+    let (receivers, settled) = add_classes(graph, inputs, NAME, receivers, options.classes);
     let list = receivers.list;
     let (gbuffer, ids) = (inputs.gbuffer, inputs.ids);
     let (view_params, part) = inputs.view_params;
@@ -446,5 +448,8 @@ fn add_visibility<'f>(
         ctx.bind_compute(&pipeline, &bindings, &[])?;
         list.dispatch(ctx)
     });
-    visibility
+    ShadowMask {
+        settled,
+        ..ShadowMask::new(visibility)
+    }
 }

@@ -1,6 +1,7 @@
 //! Options of `ssoc`.
 
 use crate::shadow::TechniqueOption;
+use crate::shadow::technique::{CLASSES, switch, switched};
 
 /// How several edges join.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +51,9 @@ pub struct SsocOptions {
     pub falloff: bool,
     /// `3 t^2 - 2 t^3` of the hidden part of the diameter, as published, instead of the light's area.
     pub cubic: bool,
+    /// Tiles of the picture that see all of the light or nothing of it are told from the triangles
+    /// between them and the light, and left out.
+    pub classes: bool,
 }
 
 impl SsocOptions {
@@ -62,6 +66,7 @@ impl SsocOptions {
         combine: Combine::Cells,
         falloff: false,
         cubic: false,
+        classes: false,
     };
 
     /// What can be set.
@@ -108,6 +113,7 @@ impl SsocOptions {
             "even or falloff (1 - s^2 at a part s of the way from the light's middle to its rim; with area=exact)",
             "brightness of the light's parts",
         ),
+        CLASSES,
     ];
 
     /// The values, in the order of [`ALL`](Self::ALL).
@@ -121,6 +127,7 @@ impl SsocOptions {
             combine.map_or("", |(name, _)| name).to_string(),
             if self.cubic { "cubic" } else { "exact" }.to_string(),
             if self.falloff { "falloff" } else { "even" }.to_string(),
+            switched(self.classes),
         ]
     }
 
@@ -142,6 +149,7 @@ impl SsocOptions {
                     _ => return None,
                 }
             }
+            "classes" => self.classes = switch(value)?,
             "emission" => {
                 self.falloff = match value {
                     "even" => false,
